@@ -2,6 +2,7 @@
 
 import queue
 
+import jax
 import pytest
 
 from plateviz.runs.scratch_result import is_judged_later, is_written, read_scratch_result
@@ -118,15 +119,19 @@ def test_what_if_of_a_prepared_orbit_needs_no_fit(requests, small_survey):
     assert kept.of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
 
 
-def test_orbit_gets_ready_with_the_solution_of_a_run(small_survey, tmp_path):
+def test_orbit_gets_ready_with_the_solution_of_a_run(small_survey, tmp_path, caplog):
     settings = FitSettings(order=2)
     base = {"settings": settings.to_dict(), "directory": str(tmp_path / "unread")}
     origin = origin_to_dict(SurveyFolder(str(small_survey)))
     request = {"do": "get ready", "origin": origin, "orbit": 0, "base": base}
     kept = Fitters()
+    jax.clear_caches()
     after = get_ready(kept, request)
     assert [*after.soon, *after.later] == []
     assert kept.of(request).fitted_settings == settings
+    with jax.log_compiles():
+        assert kept.of(request).what_if(settings.with_(prior_widths={"sources": 3.0})) is not None
+    assert [record for record in caplog.records if "Compiling" in record.msg] == []
 
 
 def test_what_is_wrong_with_an_orbit_is_not_said_unasked(monkeypatch, requests):

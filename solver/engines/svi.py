@@ -11,31 +11,27 @@ averages are reset.
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float, Int, PRNGKeyArray
-from numpyro.infer import SVI
+from jaxtyping import Float, Int
 
 from solver.data.engine_settings import SviSettings
 from solver.data.parameters import SOURCES
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
+from solver.engines.adam_steps import Stepping, adam_steps
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step
-from solver.engines.numpyro_model import ModelInput, in_coordinates, model_input
-from solver.engines.svi_guide import SITES, Means, MirroredElbo, draws, guide
+from solver.engines.numpyro_model import model_input
+from solver.engines.svi_guide import Means
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
 from solver.linear.whitening import Coordinates, in_bare_units, whitened
-from solver.model.forward import AnyArray
 from solver.problem.problem import Problem
 
-# Paper, table "Parameters of the ADAM optimizer".
-_BETA_1, _BETA_2, _EPSILON = 0.99, 0.999, 1e-4
 # Largest step of a parameter, as a fraction of its prior width: along prior-dominated directions
 # one unit of whitened coordinates is as long as the prior is wide.
 _LARGEST_STEP = 0.25
@@ -136,13 +132,12 @@ def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator
         if not is_near and _has_fallen(state, options):
             state = state._replace(cycle=(state.step, min(options.first_rate, ahead.distance)))
         coordinates = _coordinates(problem, ahead.reduced, options)
-        moved, losses = _run_block(
-            inputs,
-            jax.device_put(coordinates),
+        schedule = rate(options, state.cycle, np.arange(state.step, state.step + options.block))
+        limits = _limits(problem, coordinates, options)
+        moved, losses = adam_steps(
+            Stepping(inputs, coordinates, limits, schedule),
             Means(np.zeros_like(state.theta), np.zeros_like(state.scale), state.scale),
-            _limits(problem, coordinates, options),
             jax.random.fold_in(jax.random.key(options.seed), state.step),
-            rate(options, state.cycle, np.arange(state.step, state.step + options.block)),
         )
         theta, sources = coordinates.place(moved.calibration, moved.sources)
         row = Iteration(
@@ -247,51 +242,3 @@ def _limits(problem: Problem, coordinates: Coordinates, options: SviSettings) ->
     longest = 1.0 / np.abs(independent / priors.width[:, None]).max(axis=0)
     unlimited = np.full(1, np.inf)
     return Means(_LARGEST_STEP * longest, unlimited, np.full(1, _LARGEST_SCALE_STEP))
-
-
-@jax.jit
-def _run_block(
-    inputs: ModelInput,
-    coordinates: Coordinates,
-    means: Means,
-    limits: Means,
-    key: PRNGKeyArray,
-    rates: Float[AnyArray, " step"],
-) -> tuple[Means, Float[Array, " step"]]:
-    """Make a block of Adam's steps, with its averages reset."""
-
-    def model(draw: AnyArray) -> None:
-        in_coordinates(inputs, coordinates)
-
-    def guide_with(draw: AnyArray) -> None:
-        guide(means, draw)
-
-    adam = optax.chain(
-        optax.scale_by_adam(_BETA_1, _BETA_2, _EPSILON),
-        _limited_steps(lambda count: rates[count], limits),
-    )
-    engine = SVI(model, guide_with, adam, MirroredElbo())
-    shape = means.scale.shape
-    state = engine.init(key, jnp.zeros(shape))
-
-    def step(state: Any, draw: AnyArray) -> tuple[Any, AnyArray]:  # noqa: ANN401 numpyro's
-        return engine.update(state, draw)
-
-    state, losses = jax.lax.scan(step, state, draws(key, len(rates), shape))
-    found = engine.get_params(state)
-    return Means(*(found[name] for name in SITES)), losses
-
-
-def _limited_steps(
-    schedule: Callable[[AnyArray], AnyArray], limits: Means
-) -> optax.GradientTransformation:
-    """Return a transformation to descent steps, at the rate of the schedule up to the limits."""
-    by_site = dict(zip(SITES, limits, strict=True))
-
-    def update(updates: dict, state: AnyArray, params: object = None) -> tuple[dict, AnyArray]:
-        del params
-        now = schedule(state)
-        rates = {name: jnp.minimum(now, limit) for name, limit in by_site.items()}
-        return {name: -rates[name] * values for name, values in updates.items()}, state + 1
-
-    return optax.GradientTransformation(lambda _: jnp.zeros((), int), update)

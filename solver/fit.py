@@ -267,11 +267,6 @@ class OrbitFitter:
             contribution_of(mode.equations, problem, self._to_compile[0])
         self._to_compile.pop(0)
 
-    def forget_precomputed(self) -> None:
-        """Forget what `precompute` has kept, but for the order of the latest what-if."""
-        if self._starts is not None:
-            self._starts.forget()
-
     def _compare_orders(
         self,
         problem: Problem,

@@ -22,8 +22,6 @@ Request = dict
 # Columns of a solution's tables from which a fit starts.
 _OF_CALIBRATION = ("group", "offset")
 _OF_SOURCES = ("source_id", "offset_ra", "offset_dec")
-# Orbits of which lower distortion orders are precomputed: as large again as the rest of a fitter.
-_WITH_LOWER_ORDERS = 2
 
 
 class Fitters:
@@ -47,8 +45,6 @@ class Fitters:
             while len(self._kept) >= self._most:
                 self._kept.popitem(last=False)
             self._kept[key] = OrbitFitter(origin.read(orbit), origin.read_instrument())
-        for older in list(self._kept.values())[:-_WITH_LOWER_ORDERS]:
-            older.forget_precomputed()
         return self._kept[key]
 
 

@@ -39,7 +39,6 @@ class WarmStarts:
         """
         self._fit, self._problem_of = fit, problem_of
         self._lower: dict[int, WarmStart | None] = {}
-        self._latest = fit.settings.order
 
     def solution(self, problem: Problem, settings: FitSettings) -> Mode | None:
         """Return the mode of a changed problem, or None if it needs a fit of its own.
@@ -50,7 +49,6 @@ class WarmStarts:
         """
         self._add(settings.with_(exclusions=self._fit.settings.exclusions), _NEAR)
         base = self._nearest(settings.order)
-        self._latest = base.settings.order
         if base.settings.order < settings.order:
             return None
         mode = solve_what_if(base.mode, base.problem, problem, settings, _LONGEST)
@@ -87,10 +85,6 @@ class WarmStarts:
         """Forget the solutions of all lower orders but these."""
         kept = set(orders)
         self._lower = {order: one for order, one in self._lower.items() if order in kept}
-
-    def forget(self) -> None:
-        """Forget the solutions of all lower orders but that of the latest what-if."""
-        self.keep([self._latest])
 
     def _add(self, settings: FitSettings, tolerance: float) -> bool:
         """Solve a lower order that was not tried before; return whether it was not."""

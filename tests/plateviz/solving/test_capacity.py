@@ -7,7 +7,7 @@ from plateviz.solving.capacity import ready_orbits, usual_solvers
 
 
 @pytest.mark.parametrize(
-    ("gib", "solvers", "orbits"), [(2, 1, 4), (8, 2, 4), (24, 3, 10), (1024, 3, 16)]
+    ("gib", "solvers", "orbits"), [(2, 1, 3), (8, 2, 3), (24, 3, 8), (1024, 3, 16)]
 )
 def test_more_memory_has_room_for_more(gib, solvers, orbits, monkeypatch):
     monkeypatch.setattr(capacity, "available_bytes", lambda: gib * 2**30)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from plateviz.solving import fitters, solver_process
+from plateviz.solving import solver_process
 from plateviz.solving.fitters import Fitters
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
 from plateviz.solving.preparation import Preparation
@@ -21,7 +21,6 @@ from plateviz.solving.solver_process import (
     _serve,
 )
 from solver.errors import CancelledError, InputError
-from solver.fit import OrbitFitter
 from solver.runtime.interruption import give_way
 
 ONE = Path("result")
@@ -174,17 +173,6 @@ def test_as_many_orbits_are_kept_as_there_is_room_for(small_survey):
     assert again is not first
 
 
-def test_only_the_latest_orbits_keep_lower_orders(small_survey, monkeypatch):
-    """They take as much memory as all else that is kept of an orbit."""
-    forgetful = []
-    monkeypatch.setattr(OrbitFitter, "forget_precomputed", lambda one: forgetful.append(one))
-    monkeypatch.setattr(fitters, "_WITH_LOWER_ORDERS", 1)
-    origin = origin_to_dict(SurveyFolder(str(small_survey)))
-    kept = Fitters(most=2)
-    first, second, _ = (kept.of({"origin": origin, "orbit": orbit}) for orbit in (0, 1, 0))
-    assert forgetful == [first, second]
-
-
 class Moments:
     """Moments that are asked for and waited for."""
 
@@ -212,7 +200,7 @@ def test_long_fit_waits_for_who_asks_for_something_quick(monkeypatch, do, engine
     monkeypatch.setitem(solver_process._WORK, do, work)
     heard, said = _Heard(_Cancellations(), Moments()), []
     request = {"do": do, "job": "1", "settings": {"engine": engine}}
-    _serve(request, said.append, heard, _Kept(fitters.Fitters(), PutOff()))
+    _serve(request, said.append, heard, _Kept(Fitters(), PutOff()))
     assert heard.moments.waited == waited
     assert [event["event"] for event in said] == ["progress", "done"]
 
@@ -224,7 +212,7 @@ def test_fit_is_cancelled_while_it_waits(monkeypatch):
         heard.moments, "wait", lambda check: (heard.cancellations.add("1"), check())
     )
     request = {"do": "fit", "job": "1", "settings": {"engine": "svi"}}
-    _serve(request, said.append, heard, _Kept(fitters.Fitters(), PutOff()))
+    _serve(request, said.append, heard, _Kept(Fitters(), PutOff()))
     assert [event["event"] for event in said] == ["progress", "cancelled"]
 
 

@@ -276,18 +276,6 @@ def test_fit_that_does_not_converge_is_no_start(orbit):
     assert fitter.fitted_settings is None
 
 
-def test_precomputed_orders_are_forgotten_but_that_of_the_latest_what_if(orbit, solved_orders):
-    fitter = fitted(OrbitFitter(orbit.data, orbit.instrument))
-    list(fitter.precompute(6))
-    solved_orders.clear()
-    for _ in range(2):
-        fitter.what_if(FitSettings(order=5))
-        fitter.forget_precomputed()
-    assert solved_orders == []
-    fitter.what_if(FitSettings(order=4))
-    assert solved_orders == [4]
-
-
 def test_unfitted_orbit_needs_a_fit(orbit):
     assert OrbitFitter(orbit.data, orbit.instrument).what_if(FitSettings()) is None
 

@@ -23,9 +23,9 @@ from solver.data.subset import KINDS
 
 # Milliseconds between two looks at what a running job says.
 _PROGRESS_MILLISECONDS = 250
-# Milliseconds between two questions for what the solver process makes. Other threads tell when they
-# are done.
-_PENDING_MILLISECONDS = 50
+# Milliseconds between two questions for what the solver process makes, and how many come as soon;
+# later ones come like looks at a job. Other threads tell when they are done.
+_PENDING_MILLISECONDS, _MOST_SOON = 50, 20
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
 # Seconds between two looks whether the run is there at all, and whether others have begun.
@@ -79,6 +79,8 @@ class PageTicker:
         self._watched: Job | None = None
         self._is_to_tick = False
         self._later: TimeoutCallback | None = None
+        # Questions for what is being made, since something has last changed.
+        self._n_asked = 0
         # A timer of this page's context would keep the page until its time has come.
         later = None if self._document is None else partial(Context().run, self._loop.call_later)
         self._expected = ExpectedWhatIfs(session)
@@ -106,6 +108,7 @@ class PageTicker:
 
     def wake(self, *_: object) -> None:
         """Tick until nothing is left to do."""
+        self._n_asked = 0
         if self._is_to_tick:
             return
         if self._document is None:
@@ -192,7 +195,10 @@ class PageTicker:
             self.wake()
             return
         self._is_to_tick = True
-        self._later = self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
+        is_soon = self._n_asked < _MOST_SOON
+        self._n_asked += 1
+        wait = _PENDING_MILLISECONDS if is_soon else _PROGRESS_MILLISECONDS
+        self._later = self._document.add_timeout_callback(self._tick, wait)
         session.store.background.listen(self._call)
 
     def _come_to_rest(self) -> None:

@@ -2,7 +2,8 @@
 
 For its model, a component reads each of its parameters. Param then makes a copy of it for the
 component, in case that somebody changes it: a fifteenth of the server's time for a page. Panel also
-looks for the files of the component's class on the disk.
+looks for the files of the component's class on the disk; and each time a part of a page changes, it
+goes through the whole page five times, for what is linked in the browser.
 """
 
 from collections.abc import Callable
@@ -12,11 +13,13 @@ from typing import Any
 
 from panel.custom import ReactiveESM
 from panel.util import classproperty
+from panel.viewable import Viewable
 from param import parameterized
 
 # They have no public names. A test, run with the newest versions too, notices a change.
 _PARAM: Any = parameterized
 _COMPONENT: Any = ReactiveESM
+_VIEWABLE: Any = Viewable
 _METHODS = ("_get_model", "_get_properties")
 # The component whose model is made.
 _READING: ContextVar[Any] = ContextVar("reading", default=None)
@@ -45,6 +48,8 @@ def make_components_quick() -> None:
     # The files of a class are where they were.
     find = vars(ReactiveESM)["_bundle_path"].f
     _COMPONENT._bundle_path = classproperty(cache(find))  # noqa: SLF001
+    # Of HoloViews, ECharts and methods of Param, which are linked, a page has none.
+    _VIEWABLE._preprocessing_hooks.clear()  # noqa: SLF001
 
 
 def _reading(method: Callable) -> Callable:

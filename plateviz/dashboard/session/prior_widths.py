@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from functools import cache
 
 from solver.data.parameter_group import Group
 from solver.data.parameters import BY_NAME, PARAMETERS
@@ -12,6 +13,11 @@ from solver.data.settings import FitSettings
 
 def default_widths() -> dict[str, str]:
     """Return the texts of the paper's prior widths."""
+    return dict(_default_widths())
+
+
+@cache
+def _default_widths() -> dict[str, str]:
     return {group.name: _short(group.name, group.width) for group in PARAMETERS}
 
 

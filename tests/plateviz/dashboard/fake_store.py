@@ -23,6 +23,9 @@ class AtOnce(Executor):
             answer.set_exception(error)
         return answer
 
+    def listen(self, listener):
+        """Nothing is left to be done."""
+
 
 class NoSelections:
     """Keeps no selection."""

@@ -9,6 +9,9 @@ import pytest
 from bokeh.document import Document
 from bokeh.model import Model
 from panel.custom import ReactiveESM
+from panel.pane.holoviews import find_links, link_axes
+from panel.param import link_param_method
+from panel.viewable import Viewable
 from param import parameterized
 
 from plateviz.dashboard.serving import quick_components
@@ -28,6 +31,8 @@ def quick(monkeypatch):
         known = getattr(owner, name)
         monkeypatch.setattr(owner, name, getattr(known, "__wrapped__", known))
     monkeypatch.setattr(ReactiveESM, "_bundle_path", vars(ReactiveESM)["_bundle_path"])
+    hooks = [link_param_method, link_axes, find_links]
+    monkeypatch.setattr(Viewable, "_preprocessing_hooks", hooks)
     return quick_components.make_components_quick
 
 
@@ -96,3 +101,17 @@ def test_files_of_a_class_are_looked_for_once(quick, monkeypatch):
     monkeypatch.setattr(Path, "is_file", lambda one: looked_for.append(one.name) or is_file(one))
     Visibility().get_root(Document())
     assert not [name for name in looked_for if name.endswith(".bundle.js")]
+
+
+def test_page_is_not_searched_for_what_is_linked(quick, monkeypatch):
+    """Panel would go through all of it each time a part changes, as when a figure is drawn."""
+    searched, select = [], pmui.Button.select
+    monkeypatch.setattr(
+        pmui.Button, "select", lambda one, *what: searched.append(one) or select(one, *what)
+    )
+    pmui.Column(pmui.Button(label="Fit")).get_root(Document())
+    assert searched != []
+    quick()
+    searched.clear()
+    pmui.Column(pmui.Button(label="Fit")).get_root(Document())
+    assert searched == []

@@ -68,6 +68,8 @@ class Diagnostic:
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
     narrow_height : the same in a window narrower than 1536 pixels; 0 for `least_height`
+    column_height : the same where all figures are in one column, in a window narrower than 1200
+        pixels; 0 for `narrow_height`
     """
 
     name: str
@@ -86,6 +88,7 @@ class Diagnostic:
     equation: str = ""
     least_height: int = 0
     narrow_height: int = 0
+    column_height: int = 0
 
     @property
     def document(self) -> str:

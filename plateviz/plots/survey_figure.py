@@ -34,6 +34,8 @@ class SurveyFigure:
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
     narrow_height : the same in a window narrower than 1536 pixels; 0 for `least_height`
+    column_height : the same where all figures are in one column, in a window narrower than 1200
+        pixels; 0 for `narrow_height`
     takes_row : whether it needs a whole row of its workspace
     has_data : whether there is anything to draw, such as another run
     is_of_run : whether it differs between the runs of a survey
@@ -49,6 +51,7 @@ class SurveyFigure:
     equation: str = ""
     least_height: int = 0
     narrow_height: int = 0
+    column_height: int = 0
     takes_row: bool = False
     has_data: Callable[[SurveyTables], bool] = _always
     is_of_run: bool = True
@@ -73,6 +76,7 @@ class SourceFigure:
     equation: str = ""
     least_height: int = 0
     narrow_height: int = 0
+    column_height: int = 0
 
     @property
     def document(self) -> str:

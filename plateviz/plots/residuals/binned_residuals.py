@@ -114,6 +114,7 @@ DIAGNOSTICS = (
         22,
         _plot,
         is_wide=True,
+        column_height=760,
         equation=(
             "mean = Σ w r / (q Σ w), σ² = 1 / (q Σ w), with w = 1/s² and the share q that "
             "the fit leaves; scatter = χ² / dof − 1, σ² = 2 / dof"

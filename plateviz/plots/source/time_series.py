@@ -182,6 +182,7 @@ SOURCE_FIGURES = (
         20,
         _plot,
         is_wide=True,
+        column_height=600,
         equation=(
             "offset = q₀ + μ (t − t₀) + ϖ f(t), with the parallax factors f; residual = "
             "(estimate − fit) / σ(noise)"

@@ -91,6 +91,7 @@ SURVEY_FIGURES = (
         _plot,
         is_wide=True,
         least_height=300,
+        column_height=680,
         takes_row=True,
         equation="(fitted − true) / σ, for position, parallax and proper motion",
     ),

@@ -202,6 +202,7 @@ SURVEY_FIGURES = (
         _plot,
         is_wide=True,
         narrow_height=310,
+        column_height=600,
         equation=(
             "χ² / dof, band 1 ± √(2 / dof); rms of (estimate − catalogue) / "
             "σ(catalogue) of the reference sources"

@@ -168,6 +168,7 @@ SURVEY_FIGURES = (
         50,
         _plot,
         is_wide=True,
+        column_height=760,
         equation=(
             "measured: standard deviation of the estimates of all orbits; predicted: "
             "rms of their σ(noise); deviation: (mean − truth) / its σ from noise and "

@@ -52,6 +52,7 @@ class _Text(NamedTuple):
     equation: str = ""
     least_height: int = 0
     narrow_height: int = 0
+    column_height: int = 0
 
 
 class _Drawn(NamedTuple):

@@ -2,7 +2,8 @@
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import accumulate
 
 import panel as pn
 import panel_material_ui as pmui
@@ -29,6 +30,8 @@ from solver.errors import InputError
 _INSET, _CORNER = 4, 76
 # Least height of a card: two rows of cards fill a screen 768 pixels high.
 _LEAST_HEIGHT = 290
+# Below these widths of the window, `FigureGrid` has fewer columns, and then one.
+_NARROWER = (1536, 1200)
 # Fills its card, whatever it shows.
 _BODY = {
     "position": "absolute",
@@ -101,8 +104,7 @@ class FigureView(pn.viewable.Viewer):
         self._tools = CardTools(figure, self._text_tables)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
-        least = max(_LEAST_HEIGHT, figure.least_height)
-        heights = least, max(least, figure.narrow_height)
+        heights = figure.least_height, figure.narrow_height, figure.column_height
         self._card = _card(self.visibility, self._body, name=figure.name, least_heights=heights)
         self.change(theme)
         self._show_text("Being drawn.")
@@ -264,16 +266,17 @@ def card(content: Part, name: str) -> pmui.Paper:
     return _card(pn.Column(content, styles=_BODY, margin=0), name=name)
 
 
-def _card(
-    *contents: Part, name: str, least_heights: tuple[int, int] = (_LEAST_HEIGHT, _LEAST_HEIGHT)
-) -> pmui.Paper:
+def _card(*contents: Part, name: str, least_heights: Sequence[int] = (0, 0, 0)) -> pmui.Paper:
     """Return a card.
 
     Parameters
     ----------
-    least_heights : on a large screen, and in a narrow window, screen pixels
+    least_heights : on a large screen and in windows narrower than each of `_NARROWER`, screen
+        pixels; a smaller one has no effect
     """
-    least, least_if_narrow = least_heights
+    heights = [max(_LEAST_HEIGHT, one) for one in accumulate(least_heights, max)]
+    least, *narrow = (f":host {{ min-height: {one}px; }}" for one in heights)
+    rules = zip(_NARROWER, narrow, strict=True)
     return pmui.Paper(
         OwnLayout(),
         *contents,
@@ -287,9 +290,8 @@ def _card(
         },
         stylesheets=[
             ".paper { height: 100%; }",
-            f":host {{ min-height: {least}px; }}",
-            # Where `FigureGrid` has fewer columns.
-            f"@media (width < 1536px) {{ :host {{ min-height: {least_if_narrow}px; }} }}",
+            least,
+            *(f"@media (width < {width}px) {{ {rule} }}" for width, rule in rules),
         ],
         margin=0,
         sx={"height": "100%", "position": "relative", "zIndex": 0},

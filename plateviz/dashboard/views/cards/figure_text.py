@@ -48,3 +48,8 @@ class FigureText(Protocol):
     def narrow_height(self) -> int:
         """The same in a window narrower than 1536 pixels; 0 for `least_height`."""
         ...
+
+    @property
+    def column_height(self) -> int:
+        """The same where all cards are in one column, below 1200 pixels; 0 for `narrow_height`."""
+        ...

@@ -9,6 +9,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label, label_of
+from plateviz.dashboard.saving.changes_file import changes_file
 from plateviz.dashboard.views.elements.markup import markup_pane, numbers, paragraph, themed
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
@@ -104,7 +105,7 @@ class CompareView(pn.viewable.Viewer):
         return f"{self._session.shown_part.subject()}-changes"
 
     def _files(self) -> dict[str, Table]:
-        return {"changes": Table.from_pandas(self._changes)}
+        return changes_file(self._session.units.changes(self._changes))
 
     def _fill(self, *_: object) -> None:
         session, self._changes = self._session, pd.DataFrame()

@@ -11,6 +11,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.navigation.growth import how_to_make_another_run
 from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.saving.changes_file import changes_file
 from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.views.elements.markup import markup_pane, numbers, paragraph, themed
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -188,7 +189,7 @@ class CompareRunsView(pn.viewable.Viewer):
         return f"run-{self._navigation.run_name}-against-{other}"
 
     def _files(self) -> dict[str, Table]:
-        return {"changes": Table.from_pandas(self._changes)}
+        return changes_file(self._session.units.changes(self._changes))
 
     def _fill(self, *_: object) -> None:
         if not self._is_on_screen:

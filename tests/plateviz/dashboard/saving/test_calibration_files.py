@@ -81,6 +81,11 @@ def test_changes_and_list_of_solutions_are_saved(navigation, monkeypatch):
         ["what", "a", "b", "change"],
     )
     assert "Measurements" in list(changes["what"])
+    counts = changes[changes["what"] == "Measurements"][0]
+    assert int(counts["a"]) == navigation.session.shown.result.summary["n_measurements"] > 1000
+    navigation.session.units.unit = "µas"
+    _, made = saved(view, "CSV", monkeypatch)
+    assert "Common error in δ (µas)" in made["content"].decode()
     dialog = SolutionDialog(navigation)
     dialog.open()
     _, made = saved(dialog, "CSV", monkeypatch)

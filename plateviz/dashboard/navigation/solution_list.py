@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.selection.selected import require_visible
 from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.dashboard.session.solution_address import read_kept, run_settings, solution_of_run
 from plateviz.runs.kept_solutions import KeptSolution
@@ -116,7 +117,14 @@ class SolutionList:
         return found
 
     def rename(self, entry: Entry, name: str) -> None:
-        """Give a solution of the session a name; a what-if on the screen stays in the list."""
+        """Give a solution of the session a name; a what-if on the screen stays in the list.
+
+        Raises
+        ------
+        InputError
+            If the name has characters that cannot be seen.
+        """
+        require_visible(name, "name of a solution")
         if isinstance(entry.what, MadeSolution):
             if entry.what == self._what_if():
                 self._session.list_what_if()

@@ -115,9 +115,19 @@ def checked_name(text: str) -> str:
         raise InputError(
             f"name of a selection: expected 1 to {_LONGEST_NAME} characters, found {len(name)}"
         )
-    if any(unicodedata.category(character).startswith("C") for character in name):
-        raise InputError("name of a selection: expected characters that can be seen")
+    require_visible(name, "name of a selection")
     return name
+
+
+def require_visible(name: str, what: str) -> None:
+    """Raise InputError if a name has characters that cannot be seen, which may turn what follows.
+
+    Parameters
+    ----------
+    what : of which it is the name, for the message
+    """
+    if any(unicodedata.category(character).startswith("C") for character in name):
+        raise InputError(f"{what}: expected characters that can be seen")
 
 
 def _numbers(text: str) -> frozenset[int] | None:

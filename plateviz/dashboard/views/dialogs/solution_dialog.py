@@ -181,7 +181,7 @@ class SolutionDialog(pn.viewable.Viewer):
 
     def _give_name(self) -> None:
         if (entry := self._chosen) is not None:
-            self._list.rename(entry, self._name.value)
+            self._try(lambda: self._list.rename(entry, self._name.value))
 
     def _keep_on_disk(self) -> None:
         if (entry := self._chosen) is not None:

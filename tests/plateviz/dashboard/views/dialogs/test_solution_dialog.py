@@ -165,3 +165,19 @@ def test_kept_solution_is_shown_by_its_name_and_said_to_be_kept(
     window._keep_on_disk()
     assert window._chosen.name == "new"
     assert window._message.object == "<p>It is kept on disk as new.</p>"
+
+
+def test_name_that_turns_what_follows_is_refused_and_told(page, window, fit_result):
+    page.session.show_result(Solution(0, FitSettings(order=3), fit_result))
+    window.open()
+    choose_made(window)
+    window._name.value = "mine"
+    window._give_name()
+    window._name.value = "\u202eyours"
+    window._give_name()
+    assert [one.name for one in page.session.journal.made] == ["mine"]
+    assert (window._message.visible, "that can be seen" in window._message.object) == (True, True)
+    window._name.value = "אבג <b>"
+    window._give_name()
+    assert [one.name for one in page.session.journal.made] == ["אבג <b>"]
+    assert not window._message.visible

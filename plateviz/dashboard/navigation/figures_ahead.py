@@ -11,7 +11,7 @@ from plateviz.dashboard.session.solution import Request
 from plateviz.plots.workspace import OrbitWorkspace
 
 # Seconds between two looks whether the solver has made the solution, and how often one looks.
-_LOOK_SECONDS, _MOST_LOOKS = 0.25, 12
+_LOOK_SECONDS, _MOST_LOOKS = 0.5, 6
 
 
 class FiguresAhead:
@@ -26,18 +26,22 @@ class FiguresAhead:
         self._navigation, self._expected = navigation, expected
         self._rest = AtRest(self._look, _LOOK_SECONDS, later)
         self._looks = 0
+        self._wanted: Request | None = None
 
     def begin(self) -> None:
         """Make them once the solver has made the solution; called when the page comes to rest."""
-        self._looks = _MOST_LOOKS
-        self._rest.begin()
+        settings = self._expected.without_selection()
+        self._looks, self._wanted = _MOST_LOOKS, None
+        if settings is not None:
+            orbit = self._navigation.session.shown_part.orbit
+            self._wanted = Request(orbit, settings, is_what_if=True)
+            self._rest.begin()
 
     def _look(self) -> None:
         """Make the figures if the solution is there; look again if it is to come."""
-        session, settings = self._navigation.session, self._expected.without_selection()
-        if settings is None or session.job is not None:
+        session, wanted = self._navigation.session, self._wanted
+        if wanted is None or wanted.orbit != session.shown_part.orbit or session.job is not None:
             return
-        wanted = Request(session.shown_part.orbit, settings, is_what_if=True)
         if session.store.has_result(*wanted):
             workspace = self._navigation.orbit_workspace
             session.store.background.submit(_make, session, wanted, workspace)

@@ -143,9 +143,9 @@ class ShownPart(param.Parameterized):
 
     def exposures_of(self, result: FitResult) -> list[tuple[int, int]]:
         """Return (field_id, plate_id) of the shown exposures of a solution."""
-        table = result.exposures
-        is_shown = table["plate_id"].between(*self.plates)
+        fields, plates = (result.exposures[name].to_numpy() for name in ("field_id", "plate_id"))
+        first, last = self.plates
+        is_shown = (plates >= first) & (plates <= last)
         if self.field != ALL:
-            is_shown &= table["field_id"] == int(self.field)
-        pairs = table.loc[is_shown, ["field_id", "plate_id"]]
-        return [(int(f), int(p)) for f, p in pairs.itertuples(index=False)]
+            is_shown &= fields == int(self.field)
+        return list(zip(fields[is_shown].tolist(), plates[is_shown].tolist(), strict=True))

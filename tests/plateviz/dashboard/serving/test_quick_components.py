@@ -12,7 +12,8 @@ from panel.custom import ReactiveESM
 from panel.pane.holoviews import find_links, link_axes
 from panel.param import link_param_method
 from panel.viewable import Viewable
-from param import parameterized
+from panel_material_ui.theme import MaterialDesign
+from param import parameterized, parameters
 
 from plateviz.dashboard.serving import quick_components
 from plateviz.dashboard.views.browser.visibility import Visibility
@@ -31,6 +32,10 @@ def quick(monkeypatch):
         known = getattr(owner, name)
         monkeypatch.setattr(owner, name, getattr(known, "__wrapped__", known))
     monkeypatch.setattr(ReactiveESM, "_bundle_path", vars(ReactiveESM)["_bundle_path"])
+    find = MaterialDesign._get_modifiers.__func__
+    monkeypatch.setattr(
+        MaterialDesign, "_get_modifiers", classmethod(getattr(find, "__wrapped__", find))
+    )
     hooks = [link_param_method, link_axes, find_links]
     monkeypatch.setattr(Viewable, "_preprocessing_hooks", hooks)
     return quick_components.make_components_quick
@@ -101,6 +106,18 @@ def test_files_of_a_class_are_looked_for_once(quick, monkeypatch):
     monkeypatch.setattr(Path, "is_file", lambda one: looked_for.append(one.name) or is_file(one))
     Visibility().get_root(Document())
     assert not [name for name in looked_for if name.endswith(".bundle.js")]
+
+
+def test_theme_of_pictures_and_texts_is_found_once(quick, monkeypatch):
+    quick()
+    one = pn.pane.Markdown("words", design=MaterialDesign)
+    one.get_root(Document())
+    found, resolve = [], parameters.Filename._resolve
+    monkeypatch.setattr(
+        parameters.Filename, "_resolve", lambda own, path: found.append(path) or resolve(own, path)
+    )
+    assert "words" in one.get_root(Document()).text
+    assert found == []
 
 
 def test_page_is_not_searched_for_what_is_linked(quick, monkeypatch):

@@ -28,20 +28,20 @@ class Preparation(NamedTuple):
     soon : what a person may ask for next
     later : what speeds up the requests after that
     is_urgent : whether to begin as soon as no request waits
-    is_paused : whether to begin only when a page that opens has had time to
+    pause : seconds before it begins
     renew : returns the same again, but for what is done, if it has been interrupted
     """
 
     soon: Iterator[None] = iter(())
     later: Iterator[None] = iter(())
     is_urgent: bool = False
-    is_paused: bool = False
+    pause: float = 0.0
     renew: Callable[[], "Preparation"] | None = None
 
-    def paused(self) -> "Preparation":
+    def paused(self, seconds: float) -> "Preparation":
         """Return the same, to begin later."""
         renewed = self if self.renew is None else self.renew()
-        return renewed._replace(is_urgent=False, is_paused=True)
+        return renewed._replace(is_urgent=False, pause=seconds)
 
 
 def get_ready(fitters: Fitters, request: Request) -> Preparation:
@@ -64,14 +64,14 @@ def prepare(fitters: Fitters, request: Request, requests: Requests, put_off: Put
 
     Parameters
     ----------
-    request : with "may_fit", also fit what the what-ifs start from
+    request : with "may_fit", also fit what the what-ifs start from; with "only_fit", no more
     requests : those that wait
     put_off : takes what the likely what-ifs do without at first
     """
     order = FitSettings.from_dict(request["settings"]).order
     return Preparation(
         _soon(fitters, request, requests, put_off),
-        _precomputed(fitters, request, order),
+        iter(()) if request["only_fit"] else _precomputed(fitters, request, order),
         request["is_urgent"],
         renew=lambda: prepare(fitters, request, requests, put_off),
     )
@@ -86,7 +86,7 @@ def _soon(
         if request["may_fit"]:
             _fit(fitter, request, requests)
             yield
-        for likely in request["likely"]:
+        for likely in [] if request["only_fit"] else request["likely"]:
             with suppress(InputError, FitError):
                 _make(fitter, likely, requests, put_off)
             yield

@@ -155,6 +155,7 @@ class SolutionStore:
         request = {
             **self._fit_of(orbit, settings),
             "may_fit": may_fit,
+            "only_fit": False,
             "is_urgent": is_urgent,
             "likely": [{"settings": one.to_dict(), "directory": str(at)} for one, at in made],
         }

@@ -25,8 +25,10 @@ from plateviz.solving.solver_queue import SolverQueue
 _QUICK, _LONG = 2, 19
 # Quick jobs of one process before another is started for the next one, which has to fit its orbit.
 _FEW = 3
-# After so long without another person's request, what one person may ask for next is prepared.
+# For so long after another person's request, nothing is prepared for one person but an orbit.
 _BUSY_SECONDS = 5.0
+# For so many seconds nothing speculative starts when others ask for a what-if.
+_FOR_A_WHAT_IF = 1.0
 # How many more jobs than elsewhere wait before an orbit is made ready in another process.
 _MORE = 2
 
@@ -105,9 +107,7 @@ class SolverPool:
         with self._lock:
             queue = self._warm.get(_orbit(request), self._quick[0])
             self._warm[_orbit(request)] = queue
-            queue.prepare(request)
-            if self._is_busy(_orbit(request)):
-                queue.pause()
+            queue.prepare({**request, "only_fit": self._is_busy(_orbit(request))})
 
     def pause(self) -> None:
         """Let what processes prepare wait for a moment."""
@@ -150,7 +150,7 @@ class SolverPool:
         """Leave the cores to a job that somebody waits for."""
         for other in (*self._quick, *self._long):
             if other is not queue:
-                other.pause()
+                other.pause(_FOR_A_WHAT_IF)
 
     def _queue_for(self, request: Mapping[str, Any]) -> SolverQueue:
         if self._most == 1:

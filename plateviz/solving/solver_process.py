@@ -9,12 +9,13 @@ Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "direct
 {"do": "get ready", "job", "origin", "orbit", "base"}: for what-ifs, {"do": "simulate", "job",
 "directory", "settings", "catalogue"}, {"do": "survey", "job", "directory", "run", "settings",
 "orbits", "workers"}, {"do": "cancel", "job"}, and without events {"do": "prepare", "origin",
-"orbit", "settings", "base", "may_fit", "likely", "is_urgent"}: while idle, make the likely what-ifs
-of a solution, each {"settings", "directory"}, and with "may_fit" fit what they start from,
-{"do": "pause"}: let that, or a long fit, wait for a moment, {"do": "rest"}: give it up, and
-{"do": "complete", "part"} with the rest of a "fit" that is done: write a part that its result
-lacks, `VERDICT` or `EIGENMODES` of `plateviz.runs.scratch_result`. "base" is the solution of a run
-from which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
+"orbit", "settings", "base", "may_fit", "only_fit", "likely", "is_urgent"}: while idle, make the
+likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit what they
+start from, with "only_fit" no more, {"do": "pause", "seconds"}: let that wait, or a long fit for a
+moment, {"do": "rest"}: give it up, and {"do": "complete", "part"} with the rest of a "fit" that is
+done: write a part that its result lacks, `VERDICT` or `EIGENMODES` of
+`plateviz.runs.scratch_result`. "base" is the solution of a run from which the what-ifs of the orbit
+can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -62,8 +63,6 @@ _NEXT_S = 0.4
 # Idle seconds after that before speculative work starts. Where it shares the cores with a browser
 # that draws the verdict, this would take a third longer.
 _IDLE_S = 1.0
-# Seconds for which nothing speculative starts when a page opens or others ask for something.
-_PAUSE_S = 2.0
 # Time in which the process removes what it has not finished, once its server has ended.
 _END_S = 3.0
 
@@ -122,7 +121,7 @@ def _serve_all() -> None:
         elif request["do"] == "prepare":
             preparation = prepare(kept.fitters, request, requests, kept.put_off)
         elif request["do"] == "pause":
-            preparation = preparation.paused()
+            preparation = preparation.paused(request["seconds"])
         elif request["do"] == "rest":
             preparation = Preparation()
         else:
@@ -141,10 +140,9 @@ def _next_request(
 
     # A request that waits is sent once the one before is done, and a page that has received a
     # solution may send one, too.
-    pause = _PAUSE_S if preparation.is_paused else 0.0
     for seconds, work, steps in (
         (0.0 if preparation.is_urgent else _NEXT_S, put_off.finish_verdicts, iter(())),
-        (pause, lambda: None, preparation.soon),
+        (preparation.pause, lambda: None, preparation.soon),
         (_IDLE_S, put_off.finish, preparation.later),
     ):
         try:

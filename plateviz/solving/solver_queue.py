@@ -32,6 +32,8 @@ _GRACE_SECONDS = 15.0
 # Time in which the process removes what it has not finished.
 _END_SECONDS = 5.0
 _SHORT_SECONDS = 5.0
+# For so long nothing speculative starts when a page opens.
+_FOR_A_PAGE = 2.0
 
 
 class SolverQueue:
@@ -99,18 +101,18 @@ class SolverQueue:
             if not self._is_closed:
                 self._send({"do": "prepare", **request})
 
-    def pause(self) -> None:
-        """Let what the process prepares wait for a moment."""
-        self._tell("pause")
+    def pause(self, seconds: float = _FOR_A_PAGE) -> None:
+        """Let what the process prepares wait for some seconds, or a long fit for a moment."""
+        self._tell({"do": "pause", "seconds": seconds})
 
     def rest(self) -> None:
         """Let the process give up what it prepares."""
-        self._tell("rest")
+        self._tell({"do": "rest"})
 
-    def _tell(self, what: str) -> None:
+    def _tell(self, request: Mapping[str, object]) -> None:
         with self._lock:
             if self._process is not None:
-                self._send({"do": what})
+                self._send(request)
 
     def complete(self, job: Job, part: str) -> bool:
         """Let the process write a part of a result that it has put off; return whether it will.

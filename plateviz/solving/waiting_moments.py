@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 # A what-if takes so long, and the page as long to draw it.
 _MOMENT_S = 1.5
-# The longest that the fit waits, and how long it then goes on whatever is asked for.
-_LONGEST_S, _TURN_S = 4.0, 1.0
+# The longest that the fit waits, and how long it then goes on whatever is asked for. A few of its
+# steps may take twice as long.
+_LONGEST_S, _TURN_S = 4.0, 0.5
 _LOOK_S = 0.02
 
 
@@ -14,7 +15,7 @@ class WaitingMoments:
     """When a long fit waits; asked for by one thread, kept by another.
 
     The cores and their caches are then left to who waits. However much is asked for, the fit gets
-    a fifth of the time.
+    a ninth of the time at least.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

@@ -44,6 +44,7 @@ PREPARED = {
     "orbit": 0,
     "settings": SETTINGS.to_dict(),
     "may_fit": True,
+    "only_fit": False,
     "is_urgent": False,
     "likely": [],
 }
@@ -150,6 +151,16 @@ def test_orbit_is_not_fitted_unasked(prepared_with, monkeypatch):
     assert prepared_with()[0] is None
 
 
+def test_orbit_is_fitted_without_what_may_never_be_asked_for(
+    prepared_with, likely, requests, tmp_path, monkeypatch
+):
+    fitters, request = likely
+    list(prepare(fitters, {**request, "only_fit": True}, requests, PutOff()).soon)
+    assert not is_written(tmp_path / "lower")
+    monkeypatch.setitem(PREPARED, "only_fit", True)
+    assert prepared_with() == (SETTINGS, [])
+
+
 @pytest.fixture
 def likely(small_survey, tmp_path):
     """A fitted orbit, and a request to prepare two what-ifs of which the first is impossible."""
@@ -203,13 +214,13 @@ def test_likely_what_if_gives_way_to_others(likely, requests, tmp_path):
 
 def test_what_a_page_that_opens_has_interrupted_is_made_later(likely, requests, tmp_path):
     fitters, request = likely
-    requests.put({"do": "pause"})
+    requests.put({"do": "pause", "seconds": 2.0})
     prepared = prepare(fitters, {**request, "is_urgent": True}, requests, PutOff())
     list(prepared.soon)
     assert not is_written(tmp_path / "lower")
     requests.get()
-    paused = prepared.paused()
-    assert (paused.is_urgent, paused.is_paused) == (False, True)
+    paused = prepared.paused(2.0)
+    assert (paused.is_urgent, paused.pause) == (False, 2.0)
     list(paused.soon)
     assert is_written(tmp_path / "lower")
 

@@ -22,10 +22,12 @@ class FakeQueue(SolverQueue):
     """A queue without a process."""
 
     def _start(self):
-        self.sent, self._process = [], None
+        self.sent, self.pauses, self._process = [], [], None
 
     def _send(self, request):
-        self.sent.append(request["do"])
+        self.sent.append("only fit" if request.get("only_fit") else request["do"])
+        if request["do"] == "pause":
+            self.pauses.append(request["seconds"])
 
     def finish(self):
         self._handle({"event": "done", "job": self._jobs[0].id})
@@ -145,7 +147,7 @@ def test_what_if_without_a_run_waits_where_its_orbit_was_fitted(queues):
     assert [queue.jobs for queue in queues] == [jobs]
 
 
-def test_nothing_is_prepared_beside_what_others_ask_for(queues, monkeypatch):
+def test_orbit_is_only_fitted_beside_what_others_ask_for(queues, monkeypatch):
     monkeypatch.setattr(solver_pool, "time", SimpleNamespace(monotonic=lambda: now[0]))
     now = [0.0]
     pool = made_pool(queues, 3)
@@ -156,13 +158,13 @@ def test_nothing_is_prepared_beside_what_others_ask_for(queues, monkeypatch):
         queue._process, queue.sent = object(), []
     pool.prepare({"origin": "sky", "orbit": 1})
     assert pool.submit(from_run(2)) in queues[1].jobs
-    assert [queue.sent for queue in queues] == [["prepare", "pause", "pause"], ["fit"]]
+    assert [queue.sent for queue in queues] == [["only fit", "pause"], ["fit"]]
     now[0] = 60.0
     pool.prepare({"origin": "sky", "orbit": 1})
-    assert queues[0].sent[3:] == ["prepare"]
+    assert queues[0].sent[2:] == ["prepare"]
     pool.submit(from_run(1))
     pool.prepare({"origin": "sky", "orbit": 1})
-    assert queues[0].sent[4:] == ["prepare"]
+    assert queues[0].sent[3:] == ["prepare"]
 
 
 def test_long_fit_stops_no_preparations(pool, queues):
@@ -199,10 +201,15 @@ def test_verdict_does_not_wait_for_a_job_that_is_cancelled(pool, queues):
 def test_preparations_go_where_the_what_ifs_will(pool, queues):
     pool.submit(fit(0, "svi"))
     pool.prepare({"origin": "sky", "orbit": 3})
-    queues[0]._process = object()
+    for queue in queues:
+        queue._process = object()
     pool.pause()
     pool.rest()
     assert queues[0].sent == ["prepare", "pause", "rest"]
+    pool.submit(fit(4, what_if=True))
+    # For longer while a page opens than while another process answers.
+    opens, answers = queues[1].pauses
+    assert opens > answers
     assert pool.submit(fit(3, what_if=True)) in queues[0].jobs
 
 

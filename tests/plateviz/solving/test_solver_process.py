@@ -99,12 +99,11 @@ def test_what_is_urgent_begins_at_once(requests, monkeypatch):
 
 def test_what_is_paused_begins_later_but_a_verdict_does_not(requests, monkeypatch):
     monkeypatch.setattr(solver_process, "_NEXT_S", 0.0)
-    monkeypatch.setattr(solver_process, "_PAUSE_S", 60.0)
     done, put_off = [], PutOff()
     put_off.add_verdict(ONE, lambda: done.append("verdict"))
     soon = (done.append("what-if") for _ in range(1))
     threading.Timer(0.05, requests.put, [{"job": "1"}]).start()
-    assert _next_request(requests, Preparation(soon).paused(), put_off) == {"job": "1"}
+    assert _next_request(requests, Preparation(soon).paused(60.0), put_off) == {"job": "1"}
     assert done == ["verdict"]
 
 
@@ -218,9 +217,11 @@ def test_fit_is_cancelled_while_it_waits(monkeypatch):
 
 def test_what_is_said_to_a_process_at_work_is_heard_at_once(requests):
     heard = _Heard(_Cancellations(), Moments())
-    _hear({"do": "pause"}, requests, heard)
+    _hear({"do": "pause", "seconds": 1.0}, requests, heard)
     _hear({"do": "cancel", "job": "1"}, requests, heard)
     assert heard.moments.asked == 1
     with pytest.raises(CancelledError):
         heard.cancellations.check("1")
-    assert [requests.get_nowait() for _ in range(requests.qsize())] == [{"do": "pause"}]
+    assert [requests.get_nowait() for _ in range(requests.qsize())] == [
+        {"do": "pause", "seconds": 1.0}
+    ]

@@ -22,6 +22,7 @@ _NAMES = {
 }
 # Decimals of a number whose uncertainty is not known, which are the most that any has.
 _MOST_DECIMALS = 3
+_NO_SCATTER = "Too few orbits: the motion fits all positions exactly, or is not fitted."
 _FIGURES = ("fit", "sigma_noise", "sigma_catalogue", "sigma", "true", "pull")
 
 
@@ -82,15 +83,16 @@ def _scatter(motion: pd.Series, axis: str, symbol: str) -> SummaryItem:
         "Standard deviation of the orbits' positions about the fitted motion, and the "
         "value that their noise predicts."
     )
-    value = "–" if math.isnan(found) else f"{found:.3f} mas (expected {expected:.3f} mas)"
-    return _plain(f"Scatter in {symbol}", value, hint)
+    label = f"Scatter in {symbol}"
+    if math.isnan(found):
+        return _plain(label, "–", _NO_SCATTER)
+    return _plain(label, f"{found:.3f} mas (expected {expected:.3f} mas)", hint)
 
 
 def _chi2(motion: pd.Series) -> SummaryItem:
     dof, label = int(motion["dof"]), "χ² of the motion"
     if dof <= 0 or math.isnan(motion["chi2"]):
-        hint = "Too few orbits: the motion fits all positions exactly, or is not fitted."
-        return _plain(label, "–", hint)
+        return _plain(label, "–", _NO_SCATTER)
     hint = f"Weighted by the noise only. Expected {dof} ± {math.sqrt(2.0 * dof):.1f}."
     return _plain(label, f"{motion['chi2']:.1f} (dof {dof})", hint)
 

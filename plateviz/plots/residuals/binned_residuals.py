@@ -114,6 +114,7 @@ DIAGNOSTICS = (
         22,
         _plot,
         is_wide=True,
+        narrow_height=330,
         column_height=760,
         equation=(
             "mean = Σ w r / (q Σ w), σ² = 1 / (q Σ w), with w = 1/s² and the share q that "

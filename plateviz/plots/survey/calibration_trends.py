@@ -118,7 +118,7 @@ SURVEY_FIGURES = (
         _plot,
         is_wide=True,
         least_height=300,
-        narrow_height=440,
+        narrow_height=470,
         column_height=980,
         takes_row=True,
         equation="value − mean; the line is fitted with a step between the position angles",

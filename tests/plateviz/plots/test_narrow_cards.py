@@ -41,6 +41,16 @@ def test_frames_in_one_column_are_high_enough_and_have_their_legend(name, copies
     assert any(frame.legend_columns for frame in figure)
 
 
+@pytest.mark.parametrize(("name", "copies"), [("binned-residuals", 1), ("calibration-trends", 8)])
+def test_frames_on_a_laptop_have_their_legend(name, copies, drawings):
+    card, (draw, table) = card_of(name), drawings[name.replace("-", "_")]
+    figure = draw(table)
+    figure = replace(figure, frames=figure.frames * copies)
+    # A card as wide as the page, in a window 1366 pixels wide.
+    figure = resized(figure, 1078 - 8, card.narrow_height - 10, corner=76)
+    assert any(frame.legend_columns for frame in figure)
+
+
 def card_of(name):
     cards = (*diagnostics(), *survey_figures(), *source_figures())
     return next(one for one in cards if one.name == name)

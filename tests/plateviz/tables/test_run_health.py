@@ -138,8 +138,10 @@ def test_source_with_few_orbits_has_no_chi2_of_the_motion(survey):
     history, motion = survey.source("reference")
     few = motion.copy()
     few[["chi2", "dof", "scatter_ra", "rms_truth_2d"]] = [np.nan, 0, np.nan, np.nan]
-    found = values(source_strip(history, few))
+    strip = source_strip(history, few)
+    found = values(strip)
     assert (found["χ² of the motion"], found["Scatter in α"]) == ("–", "–")
+    assert all(item.hint.startswith("Too few orbits") for item in strip if item.value == "–")
     assert "Rms from the truth" not in found
 
 

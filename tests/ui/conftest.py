@@ -134,6 +134,8 @@ def see(page, name):
     """Go to a figure in its workspace, and wait until it is drawn."""
     turn_to_workspace(page, _WORKSPACES[name])
     card = page.locator(f".figure-{name}:visible")
+    # For a moment, the workspace before is there as well, which may have the same figure.
+    expect(card).to_have_count(1)
     card.scroll_into_view_if_needed()
     card.locator("canvas").first.wait_for(state="attached")
 

@@ -237,7 +237,7 @@ def test_back_and_forward_lead_through_the_solutions_of_an_orbit(served, open_pa
     page = open_page(f"{served}?view=orbit&workspace=verdict&orbit=0")
     order = page.get_by_role("slider", name="Distortion order")
     order.focus()
-    head = page.locator(".head:visible .solution").first
+    head = page.locator(".head:visible")
     expect(head).to_contain_text("order 5")
     page.keyboard.press("ArrowLeft")
     page.wait_for_url(re.compile("solution=order=4"))

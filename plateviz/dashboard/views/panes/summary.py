@@ -17,8 +17,6 @@ from solver.data.result import FitResult
 
 # As high as the headline of a verdict, so that nothing moves when this comes.
 _BEING_JUDGED = "<p class='verdict judging'>This solution is being judged.</p>"
-# Of the verdict and the names: they stand beside each other, where there is room.
-_HEAD = {"display": "flex", "flexWrap": "wrap", "columnGap": "20px", "alignItems": "center"}
 
 
 class HeadView(pn.viewable.Viewer):
@@ -32,17 +30,13 @@ class HeadView(pn.viewable.Viewer):
         """Follow `navigation` and its session."""
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
-        self._head, self._names, self._outdated = markup_pane(), markup_pane(), markup_pane()
-        for pane in (self._head, self._names):
-            pane.param.update(sizing_mode=None, align="center", styles={"max-width": "100%"})
-        head = pmui.FlexBox(
-            self._head, self._names, sx=_HEAD, sizing_mode="stretch_width", margin=0
+        self._head, self._outdated = markup_pane(), markup_pane()
+        self._column = pmui.Column(
+            self._head, self._outdated, sizing_mode="stretch_width", margin=0
         )
-        self._column = pmui.Column(head, self._outdated, sizing_mode="stretch_width", margin=0)
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._session.judging.param.watch(self._write, "is_pending")
-        # Apart from the verdict, whose reasons would close with each new name.
-        self._session.journal.param.watch(self._write_names, "made")
+        self._session.journal.param.watch(self._write, "made")
         self._session.units.param.watch(self._write, "unit")
         told = ["shown", "stage", "message", "is_brief", "theme"]
         self._session.param.watch(self._write_outdated, told)
@@ -55,29 +49,20 @@ class HeadView(pn.viewable.Viewer):
         return self._column
 
     def _write(self, *_: object) -> None:
-        session, shown = self._session, self._session.shown
-        self._write_names()
-        # In the middle of the page, what is said of no solution.
-        self._head.sizing_mode = "stretch_width" if shown is None else None
+        session = self._session
+        shown, other = session.shown, session.other
         if shown is None:
             self._head.object = paragraph(missing_text(session), "empty", session.theme)
             return
         is_open = self._navigation.orbit_workspace is OrbitWorkspace.VERDICT
-        self._head.object = self._part(session.units.text(self._verdict(shown.result, is_open)))
-
-    def _write_names(self, *_: object) -> None:
-        shown, other = self._session.shown, self._session.other
-        names = []
-        if shown is not None:
-            names.append(self._name(shown, "(B) Solution" if other else "Solution"))
-        if shown is not None and other is not None:
+        names = [self._name(shown, "(B) Solution" if other else "Solution")]
+        if other is not None:
             names.append(self._name(other, "(A) Compared with solution"))
-        self._names.param.update(object=self._part("".join(names)), visible=bool(names))
-
-    def _part(self, markup: str) -> str:
-        session = self._session
         stale = " stale" if session.stage is Stage.STALE else ""
-        return f"<div class='head {session.theme}{stale}'>{markup}</div>"
+        verdict = session.units.text(self._verdict(shown.result, is_open))
+        self._head.object = (
+            f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
+        )
 
     def _write_outdated(self, *_: object) -> None:
         # Apart from the verdict, whose reasons would close with each step of a fit.

@@ -52,12 +52,6 @@ def tables(view):
     return view.__panel__()[0], view.__panel__()[-1]
 
 
-def head_of(navigation):
-    """Return the verdict, the names of the solutions, and why they are outdated."""
-    (verdict, names), outdated = HeadView(navigation).__panel__()
-    return verdict, names, outdated
-
-
 def figure(page, name="residual-map"):
     (view,) = (one for one in page.figures._views if one.card_name == name)
     view.visibility.param.update(is_near=True, room=[500, 400])
@@ -67,7 +61,7 @@ def figure(page, name="residual-map"):
 
 def test_panes_of_an_orbit_go_through_their_states(fresh):
     session = fresh.session
-    (head, _, outdated), strip = head_of(fresh), StripView(session).__panel__()
+    (head, outdated), strip = HeadView(fresh).__panel__(), StripView(session).__panel__()
     calibration, page = CalibrationView(session), OrbitPage(fresh, wake)
     words, tabs = tables(calibration)
     view = figure(page)
@@ -102,7 +96,7 @@ def test_panes_of_an_orbit_go_through_their_states(fresh):
 
 def test_nothing_is_said_of_a_what_if_that_has_only_begun(fresh, monkeypatch):
     session = fresh.session
-    outdated, refit = head_of(fresh)[2], RefitView(fresh)
+    outdated, refit = HeadView(fresh).__panel__()[1], RefitView(fresh)
     finish(session)
     session.choices.order = 3
     assert session.stage is Stage.STALE
@@ -121,7 +115,7 @@ def test_nothing_is_said_of_a_what_if_that_has_only_begun(fresh, monkeypatch):
 def test_solution_is_shown_while_it_is_being_judged(fresh):
     session = fresh.session
     session.store.judge.has_judged = lambda _: False
-    head, strip = head_of(fresh)[0], StripView(session).__panel__()
+    head, strip = HeadView(fresh).__panel__()[0], StripView(session).__panel__()
     finish(session)
     page = OrbitPage(fresh, wake)
     fresh.turn_to_workspace(OrbitWorkspace.PATTERNS)
@@ -185,21 +179,18 @@ def test_two_solutions_that_are_exchanged_are_no_step_of_the_history(fresh):
 
 def test_solution_is_shown_with_the_name_that_a_person_gives_it(fresh):
     session = fresh.session
-    (verdict, names, _), choice = head_of(fresh), RefitView(fresh)._solutions
+    head, choice = HeadView(fresh).__panel__()[0], RefitView(fresh)._solutions
     finish(session)
-    before = verdict.object
     (made,) = session.journal.made
     session.journal.rename(made, "<first>")
-    assert "Solution of orbit 0:</span> <b>&lt;first&gt;: order 5</b>" in names.object
+    assert "Solution of orbit 0:</span> <b>&lt;first&gt;: order 5</b>" in head.object
     assert list(choice.options) == ["<first>: order 5"]
-    # Its reasons, which a person has opened, would close.
-    assert verdict.object == before
     session.journal.rename(made, "mine")
     of_run = session.shown._replace(run="default")
     session.compare_with(of_run)
-    assert "<b>mine: order 5</b>" in names.object
+    assert "<b>mine: order 5</b>" in head.object
     # The solution of a run has the same settings, and is another one.
-    assert "<b>order 5</b>" in names.object
+    assert "<b>order 5</b>" in head.object
 
 
 def test_solution_of_another_run_is_among_those_to_choose_while_it_is_shown(fresh):
@@ -250,7 +241,7 @@ def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):
 
 def test_first_solution_that_failed_says_what_to_do(fresh):
     session = fresh.session
-    head, page = head_of(fresh)[0], OrbitPage(fresh, wake)
+    head, page = HeadView(fresh).__panel__()[0], OrbitPage(fresh, wake)
     words, tabs = tables(CalibrationView(session))
     view = figure(page)
     session.job.take({"event": "failed", "message": "no reference source"})

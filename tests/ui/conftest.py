@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import expect, sync_playwright
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.workspace import OrbitWorkspace, title_of

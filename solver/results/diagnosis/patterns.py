@@ -5,6 +5,7 @@ same cause make up a `Family`.
 """
 
 from collections.abc import Iterator
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -100,6 +101,12 @@ class Patterns:
     def n_steps(self) -> int:
         """The number of steps between fields."""
         return len(self.times) - N_SMOOTH
+
+    def at_times_of(self, camera: Camera) -> "Patterns":
+        """Return the same patterns for exposures at other times."""
+        other = copy(self)
+        other.camera, other.times = camera, _times(camera)
+        return other
 
     def column(self, place: int, time: int) -> int:
         """Return the column of a spatial function and a time."""

@@ -110,7 +110,8 @@ def covariance_of_products(
     all_exposures : whether the sample has them all, of fewer sources
     """
     sample = sample_of(rows, camera, result.sources, all_exposures=all_exposures)
-    parts = [_sums(result, camera, part, patterns) for part in sample.parts]
+    patterns = patterns.at_times_of(sample.camera)
+    parts = [_sums(result, sample.camera, part, patterns) for part in sample.parts]
     total, left = reduce(_Sums.plus, parts).covariance(sample.weight)
     if len(parts) > 1:
         # Few sources leave less of the patterns than all would, because they decide what is fitted

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
+from numpy.polynomial import legendre
 
 from solver.results.diagnosis.rows import Camera, Rows
 
@@ -24,11 +26,13 @@ class Sample(NamedTuple):
     Attributes
     ----------
     parts : all of the sample; if it does not have all sources, two halves of it
+    camera : with the times at which the exposures of the sample stand for all
     weight : of all rows, um^-2
     share : of all sources that the sample has
     """
 
     parts: Sequence[Rows]
+    camera: Camera
     weight: float
     share: float
 
@@ -39,21 +43,21 @@ def sample_of(
     """Return a sample.
 
     A source stays at one place of the focal plane while a field is exposed. So few exposures of
-    each field, or of each span of it, have nearly all that the data say, if each is given the
-    weight of those about it: the ones of most weight, since the noise may differ between exposures.
-    What counts are the sources: of these, as many are taken as there is time for, evenly spread
-    over the sky.
+    each field, or of each span of it, have nearly all that the data say, if each is given the time
+    and the weight of a Gauss quadrature: sums over all exposures of what changes smoothly are then
+    exact. Those of most weight are taken, since the noise may differ between exposures. What counts
+    are the sources: of these, as many are taken as there is time for, evenly spread over the sky.
 
     Parameters
     ----------
     sources : of the result
     all_exposures : of few sources then; for what depends on the time in detail
     """
-    some = rows if all_exposures else _heaviest_exposures(rows, camera)
+    some, camera = (rows, camera) if all_exposures else _heaviest_exposures(rows, camera)
     most = _MOST_OF_ALL_EXPOSURES if all_exposures else _MOST_ROWS
     weight, counts = float(some.weight.sum()), np.bincount(some.source, minlength=len(sources))
     if some.n <= most:
-        return Sample([some], weight, 1.0)
+        return Sample([some], camera, weight, 1.0)
     order = _along_the_sky(sources)
     order = order[counts[order] > 0]
     step = some.n / most
@@ -62,24 +66,51 @@ def sample_of(
     exposures = [np.flatnonzero(np.diff(part.first)) for part in (some, *parts)]
     if not all(np.array_equal(exposures[0], of_part) for of_part in exposures[1:]):
         parts = [_of_sources(some, taken, len(sources))]
-    return Sample(parts, weight, 1.0 / step)
+    return Sample(parts, camera, weight, 1.0 / step)
 
 
-def _heaviest_exposures(rows: Rows, camera: Camera) -> Rows:
-    """Return the rows of some exposures, each with the weight of those about it."""
+def _heaviest_exposures(rows: Rows, camera: Camera) -> tuple[Rows, Camera]:
+    """Return the rows of some exposures, with the weights and times at which they stand for all."""
     each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.span.max() + 1)), 0)
     of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
-    factor = np.zeros(len(camera.time))
+    factor, time = np.zeros(len(camera.time)), camera.time.copy()
     for span in np.unique(camera.span):
-        of_span = np.flatnonzero(camera.span == span)
+        of_span = np.flatnonzero((camera.span == span) & (of_exposure > 0.0))
+        of_span = of_span[np.argsort(camera.time[of_span], kind="stable")]
         count = min(max(each, _LEAST_EXPOSURES), len(of_span))
-        for group in np.array_split(of_span, count):
+        if count == len(of_span):
+            factor[of_span] = 1.0
+            continue
+        nodes = gauss_quadrature(camera.time[of_span], of_exposure[of_span], count)
+        for group, node, weight in zip(np.array_split(of_span, count), *nodes, strict=True):
             # The first of equal ones: their sums differ by rounding, with the order of the rows.
             is_heavy = of_exposure[group] >= (1.0 - _ROUNDING) * of_exposure[group].max()
             heaviest = group[np.argmax(is_heavy)]
-            factor[heaviest] = of_exposure[group].sum() / max(of_exposure[heaviest], 1e-300)
+            time[heaviest], factor[heaviest] = node, weight / of_exposure[heaviest]
     some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
-    return some._replace(weight=some.weight * factor[some.exposure])
+    phase = camera.phase + (time - camera.time) * np.ptp(camera.phase) / np.ptp(camera.time)
+    some = some._replace(weight=some.weight * factor[some.exposure])
+    return some, camera._replace(time=time, phase=phase)
+
+
+def gauss_quadrature(
+    time: Float[np.ndarray, " n"], weight: Float[np.ndarray, " n"], count: int
+) -> tuple[Float[np.ndarray, " node"], Float[np.ndarray, " node"]]:
+    """Return `count` times, ascending, and their weights: a Gauss quadrature of a discrete measure.
+
+    Weighted sums of polynomials up to degree 2 `count` - 1 are the same as over the given times
+    (Golub and Welsch, Mathematics of Computation 23, 221, 1969).
+
+    Parameters
+    ----------
+    time, weight : more than `count` different times, and their positive weights
+    """
+    middle, half = 0.5 * (time.max() + time.min()), 0.5 * np.ptp(time)
+    within, root = (time - middle) / half, np.sqrt(weight)
+    # Orthonormal polynomials, of which the first is constant.
+    basis, _ = np.linalg.qr(root[:, None] * legendre.legvander(within, count - 1))
+    nodes, vectors = np.linalg.eigh(basis.T @ (within[:, None] * basis))
+    return middle + half * nodes, float(weight.sum()) * vectors[0] ** 2
 
 
 def _of_sources(rows: Rows, sources: np.ndarray, n_sources: int) -> Rows:

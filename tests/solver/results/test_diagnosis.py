@@ -169,19 +169,23 @@ def test_sample_of_the_sources_stands_for_all(clean, monkeypatch):
     assert rise - 1.0 < 0.6 * (without - 1.0)
 
 
-def test_sources_of_a_sample_are_spread_over_the_sky():
-    """Also where right ascension passes zero; the reference sources are sampled by themselves."""
-    random = np.random.default_rng(0)
-    ra, dec = random.uniform(-0.5, 0.5, (2, 4000))
-    sources = pd.DataFrame({"ra": ra % 360.0, "dec": dec, "is_reference": ra < -0.4})
-    order = sample._along_the_sky(sources)
-    chosen = sources.iloc[order[::10]]
-    cells = (chosen["ra"] + 0.5) % 360.0 // 0.25 * 4 + (chosen["dec"] + 0.5) // 0.25
-    counts = np.bincount(cells.astype(int), minlength=16)
-    assert counts.sum() == 400
-    # Drawn at random, they would scatter by 5.
-    assert np.std(counts) < 3
-    assert chosen["is_reference"].mean() == pytest.approx(sources["is_reference"].mean(), abs=0.003)
+@pytest.mark.parametrize("subject", ["shift", "turn", "bend"])
+def test_few_exposures_stand_for_all(clean, monkeypatch, subject):
+    """Their times and weights are those of a quadrature: detectors that move in a field show it."""
+    camera, rows = camera_rows(clean)
+    patterns = Patterns(camera, ORDER, source_magnitudes(clean))
+
+    def left(most):
+        monkeypatch.setattr(sample, "_MOST_ROWS", most)
+        return covariance_of_products(clean, camera, rows, patterns)[1]
+
+    few, of_all = left(rows.n // 6 + len(camera.time)), left(rows.n)
+    for family in (one for one in patterns.families if one.subject == subject):
+        square = np.ix_(family.columns, family.columns)
+        of_few, whole = few[square], of_all[square]
+        known = np.diag(whole) > 0.02 * np.diag(whole).max()
+        chi2 = np.trace(np.linalg.solve(of_few[known][:, known], whole[known][:, known]))
+        assert chi2 == pytest.approx(known.sum(), rel=0.03)
 
 
 def test_good_solution_has_no_cause(clean):

@@ -1,0 +1,36 @@
+"""Samples of the measurements: which sources and which exposures stand for all."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from solver.results.diagnosis import sample
+from solver.results.diagnosis.sample import gauss_quadrature
+
+
+def test_sources_of_a_sample_are_spread_over_the_sky():
+    """Also where right ascension passes zero; the reference sources are sampled by themselves."""
+    random = np.random.default_rng(0)
+    ra, dec = random.uniform(-0.5, 0.5, (2, 4000))
+    sources = pd.DataFrame({"ra": ra % 360.0, "dec": dec, "is_reference": ra < -0.4})
+    order = sample._along_the_sky(sources)
+    chosen = sources.iloc[order[::10]]
+    cells = (chosen["ra"] + 0.5) % 360.0 // 0.25 * 4 + (chosen["dec"] + 0.5) // 0.25
+    counts = np.bincount(cells.astype(int), minlength=16)
+    assert counts.sum() == 400
+    # Drawn at random, they would scatter by 5.
+    assert np.std(counts) < 3
+    assert chosen["is_reference"].mean() == pytest.approx(sources["is_reference"].mean(), abs=0.003)
+
+
+@pytest.mark.parametrize("count", [1, 4, 7])
+def test_quadrature_is_exact_for_polynomials(count):
+    random = np.random.default_rng(3)
+    time, weight = np.sort(random.uniform(0.2, 0.4, 24)), random.uniform(0.5, 2.0, 24)
+    nodes, weights = gauss_quadrature(time, weight, count)
+    assert np.all(np.diff(nodes) > 0.0)
+    assert time[0] < nodes[0]
+    assert nodes[-1] < time[-1]
+    assert np.all(weights > 0.0)
+    for degree in range(2 * count):
+        assert weights @ nodes**degree == pytest.approx(weight @ time**degree, rel=1e-9, abs=0.0)

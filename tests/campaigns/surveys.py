@@ -85,6 +85,10 @@ class Trial(NamedTuple):
     defect: str
     seed: int
 
+    def settings(self, of_all: SurveySettings) -> SurveySettings:
+        """Return the settings of its survey, given those that all have."""
+        return replace(of_all, seed=self.seed, defects=(self.defect,) if self.defect else ())
+
     def folder(self, parent: Path) -> Path:
         """Return where its tables are kept."""
         return parent / f"{(self.defect or 'clean').replace('/', ' per ')} {self.seed}"
@@ -101,19 +105,18 @@ def main() -> int:
         folder = trial.folder(arguments.folder)
         if not (folder / "orbits.parquet").is_file():
             write(f"{trial.defect or 'clean'}, seed {trial.seed}")
-            fit(trial, folder)
+            fit(trial.settings(SETTINGS), folder)
     write(table(trials, arguments.folder))
     return 0
 
 
-def fit(trial: Trial, folder: Path) -> None:
+def fit(settings: SurveySettings, folder: Path) -> None:
     """Simulate and fit a survey, and keep the tables from which the run is judged."""
-    defects = (trial.defect,) if trial.defect else ()
     with tempfile.TemporaryDirectory() as scratch:
         survey = Path(scratch) / "survey"
-        simulate_survey(survey, replace(SETTINGS, seed=trial.seed, defects=defects))
+        simulate_survey(survey, settings)
         run = begin_run(survey, "default", FitSettings())
-        for orbit in range(ORBITS):
+        for orbit in range(settings.orbits):
             fit_survey_orbit(str(survey), run.name, orbit)
         gather(run)
         found = Run(run)
@@ -123,6 +126,7 @@ def fit(trial: Trial, folder: Path) -> None:
         for table_, frame in zip(RUN_TABLES, frames, strict=True):
             frame.to_parquet(folder / f"{table_.name}.parquet")
         found.motions().to_parquet(folder / "motions.parquet")
+        # The last one: a folder that has it is whole.
         found.orbits().to_parquet(folder / "orbits.parquet")
 
 
@@ -151,10 +155,10 @@ def table(trials: Sequence[Trial], folder: Path) -> str:
         first = Counter(one[0] if one else "-" for one in names)
         text = ", ".join(f"{name} {count}" for name, count in first.most_common())
         label = f"`{defect}`" if defect else "none"
-        moved = np.mean([shift(trial, folder) for trial in of_defect]) if defect else None
+        mean = np.mean([shift(trial, folder) for trial in of_defect]) if defect else None
         lines.append(
-            f"| {label} | {'-' if moved is None else f'{moved:.2g}'} | {len(verdicts)} | {seen} |"
-            f" {'-' if moved is None else right} | {bad} | {text} |"
+            f"| {label} | {'-' if mean is None else f'{mean:.2g}'} | {len(verdicts)} | {seen} |"
+            f" {'-' if mean is None else right} | {bad} | {text} |"
         )
     return "\n".join(lines)
 
@@ -164,15 +168,25 @@ def shift(trial: Trial, parent: Path) -> float:
 
     Compared are the sources with many orbits that are no reference stars.
     """
+    return float(np.sqrt(np.mean(moved(trial, parent).to_numpy() ** 2)))
+
+
+def moved(trial: Trial, parent: Path) -> pd.DataFrame:
+    """Return by how much a defect moves the mean positions of these sources, mas."""
     columns = ["mean_deviation_ra", "mean_deviation_dec"]
-    with_it, without = (
-        pd.read_parquet(one.folder(parent) / "motions.parquet").set_index("source_id")
-        for one in (trial, Trial(CLEAN, trial.seed))
-    )
-    many = without[(without["n_orbits"] >= MANY_ORBITS) & ~without["is_reference"]]
-    both = many.index.intersection(with_it.index)
-    moved = with_it.loc[both, columns] - without.loc[both, columns]
-    return float(np.sqrt(np.mean(moved.to_numpy() ** 2)))
+    with_it, without = (motions(one, parent) for one in (trial, Trial(CLEAN, trial.seed)))
+    both = often_measured(without).intersection(with_it.index)
+    return with_it.loc[both, columns] - without.loc[both, columns]
+
+
+def motions(trial: Trial, parent: Path) -> pd.DataFrame:
+    """Return the kept motions of a run by source."""
+    return pd.read_parquet(trial.folder(parent) / "motions.parquet").set_index("source_id")
+
+
+def often_measured(found: pd.DataFrame) -> pd.Index:
+    """Return the sources with many orbits that are no reference stars."""
+    return found.index[(found["n_orbits"] >= MANY_ORBITS) & ~found["is_reference"]]
 
 
 def parse_arguments() -> argparse.Namespace:

@@ -103,12 +103,44 @@ def test_wrong_references_end_with_exit_code_three(run, orbit, measured_referenc
     code, out, err = run("fit", orbit[0], reference, "-o", tmp_path / "r.fits", "--json")
     assert code == 3
     assert "the fit converged, but its solution should not be trusted" in err
-    assert json.loads(out)["verdict"]["state"] == "bad"
+    verdict = json.loads(out)["verdict"]
+    assert verdict["state"] == "bad"
+    cause = verdict["causes"][0]
+    assert cause["name"] == "wrong-references"
+    assert cause["significance"] > 10.0
+    assert cause["title"] in verdict["headline"]
+    assert all(cause[part] for part in ("words", "spoils", "action", "options"))
+    assert verdict["reasons"]
     assert fits.getheader(tmp_path / "r.fits")["VERDICT"] == "bad"
     options = ["--overwrite", "--accept"]
     code, out, err = run("fit", orbit[0], reference, "-o", tmp_path / "r.fits", *options)
     assert code == 0
     assert "This solution should not be trusted as it is: " in out
+
+
+def test_a_fit_that_does_not_converge_has_a_verdict_too(run, orbit, tmp_path):
+    """Forty pairs of measurements have each other's identification."""
+
+    def change(table):
+        if "source_id" not in table.names:
+            return
+        keys = ("orbit_id", "field_id", "plate_id", "detector_id")
+        even = np.arange(0, len(table) - 1, 2)
+        alike = np.all([table[key][even] == table[key][even + 1] for key in keys], axis=0)
+        for row in np.random.default_rng(0).choice(even[alike], 40, replace=False):
+            pair = [row, row + 1]
+            table["source_id"][pair] = table["source_id"][pair[::-1]]
+
+    observation = changed(orbit[0], tmp_path, change)
+    code, out, err = run("fit", observation, orbit[1], "-o", tmp_path / "r.fits", "--json")
+    assert code == 1
+    verdict = json.loads(out)["verdict"]
+    assert verdict["state"] == "bad"
+    cause = verdict["causes"][0]
+    assert cause["name"] == "swapped"
+    assert "--robust" in cause["options"]
+    assert len(cause["items"]) > 20
+    assert "has not converged" in err
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import objective
 from solver.engines.numpyro_model import model_input, plate_analysis
 from solver.errors import InputError
+from solver.fit import fit_orbit
 from solver.linear.chi2 import gradient
 from solver.linear.covariances import covariances
 from solver.linear.leverage import residuals
@@ -171,3 +172,19 @@ def test_a_change_of_the_time_scale_needs_a_refit(problem, expansion_point, data
 def test_a_shift_by_magnitude_needs_magnitudes(small_orbit, setting):
     with pytest.raises(InputError, match="expected magnitudes in the catalogue, found none"):
         build_problem(small_orbit.data, small_orbit.instrument, FitSettings(**{setting: True}))
+
+
+def test_causes_that_are_off_change_no_bit_of_the_solution(small_orbit, data):
+    """Neither do their widths and periods, nor magnitudes, which only causes use."""
+    off = FitSettings(
+        breathing_period=50.0,
+        drift_in_time=3,
+        prior_widths={group.name: 0.1 for group in OPTIONAL_GROUPS},
+    )
+    plain = fit_orbit(small_orbit.data, small_orbit.instrument)
+    found = fit_orbit(data, small_orbit.instrument, off)
+    for name in ("calibration", "sources", "residuals"):
+        expected, table = getattr(plain, name), getattr(found, name)
+        assert len(table) == len(expected)
+        for column in expected.columns.drop("magnitude", errors="ignore"):
+            np.testing.assert_array_equal(table[column], expected[column], err_msg=column)

@@ -41,6 +41,11 @@ from plateviz.tables.outliers import outlier_list
 from plateviz.tables.prior_separation import prior_separation, prior_separation_histogram
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
+from plateviz.tables.reference_fields import (
+    ReferenceFieldsStatistics,
+    reference_fields,
+    reference_fields_statistics,
+)
 from plateviz.tables.reference_influence import reference_influence
 from plateviz.tables.reference_scatter import reference_scatter, scatter_cells
 from plateviz.tables.reproduction import reproduction
@@ -94,6 +99,7 @@ __all__ = [
     "MapStatistics",
     "NON_REFERENCE",
     "REFERENCE",
+    "ReferenceFieldsStatistics",
     "ScatterStatistics",
     "ShiftStatistics",
     "SummaryItem",
@@ -144,6 +150,8 @@ __all__ = [
     "prior_shares",
     "pull_bins",
     "pull_histogram",
+    "reference_fields",
+    "reference_fields_statistics",
     "reference_influence",
     "reference_scatter",
     "reproduction",

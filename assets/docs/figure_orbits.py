@@ -95,6 +95,16 @@ def _moved_in_field(rows: pd.DataFrame, _: np.random.Generator) -> None:
     rows.loc[(rows["detector_id"] == 2) & (rows["field_id"] == 3), "nx"] += 0.01
 
 
+def _displaced_stars(rows: pd.DataFrame, _: np.random.Generator) -> None:
+    """Displace two reference stars in one of their fields, by twice the measurement error."""
+    known = _orbit().catalogue.query("is_reference")["source_id"]
+    of_star = rows[rows["source_id"].isin(known)].groupby("source_id")
+    often = of_star["field_id"].nunique().sort_values(kind="stable").index[-2:]
+    for star in often:
+        field = rows.loc[rows["source_id"] == star, "field_id"].max()
+        rows.loc[(rows["source_id"] == star) & (rows["field_id"] == field), "nx"] += 0.02
+
+
 def _deforming(rows: pd.DataFrame, random: np.random.Generator) -> None:
     """Add gradients of waves of 12 mm to each exposure, of a quarter of the measurement error."""
     number = {d.detector_id: i for i, d in enumerate(MINI_MOCK.detectors)}
@@ -256,6 +266,7 @@ ORBITS: Mapping[str, Pair] = {
     "deviation": (_good_chosen, lambda: _chosen(_overconfident_catalogue())),
     "uncertainty": (_good_chosen, lambda: _chosen(_few_references())),
     "reference-influence": (_good_chosen, lambda: _chosen(_wrong_references())),
+    "reference-fields": (_good_chosen, lambda: _chosen(_fitted(_measured(_displaced_stars)))),
     "exposure-chi2": (_good_chosen, lambda: _chosen(_fitted(_measured(_trailed)))),
     "detector-shifts": (_good_chosen, lambda: _chosen(_fitted(_measured(_drifting_detector)))),
     "exposure-tracks": (_good_chosen, lambda: _chosen(_stale_attitude())),

@@ -94,6 +94,10 @@ def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, ins
                 instrument,
             ),
         ),
+        "reference_fields": (
+            plots.plot_reference_fields,
+            tables.reference_fields(fit_result, instrument),
+        ),
         "reference_influence": (
             plots.plot_reference_influence,
             tables.reference_influence(linear_fit),

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from plateviz import tables
-from plateviz.plots import plot_largest_residuals, plot_reference_influence
+from plateviz.plots import (
+    plot_largest_residuals,
+    plot_reference_fields,
+    plot_reference_influence,
+)
 from plateviz.plots.elements.style import SERIES_COLOURS
 from plateviz.tables.largest_residuals import MEASUREMENT, SOURCE
 from tests.plateviz.plots.drawn import plots_of, renderers_of, subtitle_of
@@ -29,6 +33,11 @@ def faulty(fit_result):
 @pytest.fixture(scope="module")
 def references(linear_fit):
     return tables.reference_influence(linear_fit)
+
+
+@pytest.fixture(scope="module")
+def between_fields(fit_result, instrument):
+    return tables.reference_fields(fit_result, instrument)
 
 
 def test_good_residuals_are_all_ordinary(residuals):
@@ -121,3 +130,45 @@ def test_wrong_reference_is_strong_and_counted(references):
     (drawn,) = (one for one in renderers_of(plot) if one.name == "sources")
     assert len(drawn.data_source.data["id"]) == len(frame["sources"])
     assert frame.x.limits[1] > 9.0
+
+
+def test_scatter_between_fields_is_drawn_of_both_coordinates(between_fields):
+    (frame,) = plot_reference_fields(between_fields)
+    for axis in ("ra", "dec"):
+        rows, drawn = between_fields[between_fields["coordinate"] == axis], frame[axis]
+        assert np.array_equal(drawn.values("x"), rows["expected_mas"])
+        assert np.array_equal(drawn.values("y"), rows["scatter_mas"])
+        assert drawn.columns["id"].tolist() == rows["id"].tolist()
+        assert set(drawn.columns["strength"]) == {"expected"}
+    assert np.array_equal(frame["identity"].values("x"), frame["identity"].values("y"))
+    assert frame.x.label == "expected scatter (mas)"
+    assert frame.y.label == "measured scatter (mas)"
+
+
+def test_scatter_between_fields_has_its_chi2_in_words(between_fields):
+    (frame,) = plot_reference_fields(between_fields)
+    found, words = tables.reference_fields_statistics(between_fields), subtitle_of(frame)
+    assert f"{found.n} reference stars in two fields or more" in words
+    assert f"χ² {found.chi2:.0f}, expected {found.dof:.0f} ± {found.scatter:.0f}" in words
+    assert f"0 beyond {found.limit:.1f}σ" in words
+    assert f"largest {found.largest:.1f}σ" in words
+
+
+def test_star_that_is_elsewhere_in_a_field_is_large_and_counted(between_fields):
+    table = between_fields.copy()
+    star = table["id"] == table["id"].iloc[0]
+    table.loc[star, "is_beyond"] = True
+    table.loc[star, "scatter_mas"] = 30.0
+    (frame,) = plot_reference_fields(table)
+    for axis in ("ra", "dec"):
+        strength = frame[axis].columns["strength"]
+        assert (np.asarray(strength) == "beyond").sum() == 1
+        sizes = frame[axis].looks["size"].looks
+        assert sizes["beyond"] > sizes["expected"]
+    assert "1 beyond" in subtitle_of(frame)
+    assert frame.y.limits[1] > 30.0
+
+
+def test_single_field_gives_a_message(between_fields):
+    figure = plot_reference_fields(between_fields.head(0))
+    assert figure.message == "No reference star in two fields or more"

@@ -134,7 +134,7 @@ def test_page_has_the_shares_of_the_records(records):
     assert "rest on 5 trials, 2 of them clean orbits" in text
     assert "| 2 | 1 of 2 | 1 of 2 | 0 of 2 |" in text
     assert f"| `{CASES[0].name}` | 0.085 um | - | - | 2, 1 of 2 | - | - |" in text
-    assert f"| `{CASES[0].name}` | 1.100 | {CASES[0].causes[0]} 1, noise 1 |" in text
+    assert f"| `{CASES[0].name}` | × 1 | 1.100 | {CASES[0].causes[0]} 1, noise 1 |" in text
     assert "| called not to be trusted | at most 0.5 % | 0 of 2: below 77.6 % with" in text
     assert "| called with care | at most 5 % | 1 of 2: below 97.5 % with 95 %" in text
     assert (

@@ -69,10 +69,15 @@ def tables(records: Mapping[int, Record]) -> str:
         _row("defect", "amplitude", *(f"× {factor:g}" for factor in FACTORS)),
         "|---|---:|" + "---:|" * len(FACTORS),
         *(_seen_row(case, of_case) for case, of_case in of_cases.items()),
-        "\nThe first cause that is named at the amplitude itself (× 1), and the rms pull there:\n",
-        _row("defect", "pull", "first cause, orbits"),
-        "|---|---:|---|",
-        *(_named_row(case, of_case[1.0]) for case, of_case in of_cases.items() if of_case[1.0]),
+        "\nThe first cause that is named at each factor, and the rms pull there:\n",
+        _row("defect", "factor", "pull", "first cause, orbits"),
+        "|---|---:|---:|---|",
+        *(
+            _named_row(case, factor, of_case[factor])
+            for case, of_case in of_cases.items()
+            for factor in FACTORS
+            if of_case[factor]
+        ),
         "\nWith the cause modelled, at five times the amplitude:\n",
         _row(
             "defect",
@@ -119,10 +124,10 @@ def _seen_row(case: DefectCase, of_case: _Records) -> str:
     return _row(case.title, amplitude, *cells)
 
 
-def _named_row(case: DefectCase, records: Sequence[Record]) -> str:
+def _named_row(case: DefectCase, factor: float, records: Sequence[Record]) -> str:
     first = Counter(one["causes"][0] if one["causes"] else _NO_CAUSE for one in records)
     named = ", ".join(f"{name} {count}" for name, count in first.most_common())
-    return _row(case.title, _pull(records), named)
+    return _row(case.title, f"× {factor:g}", _pull(records), named)
 
 
 def _modelled_row(case: DefectCase, records: Sequence[Record]) -> str:

@@ -70,9 +70,13 @@ def carry(records: Path, before: str, version: str, count: int) -> int:
 
 
 def trial(number: int) -> Record:
+    """Return the verdict of the trial of a number, as `record_of`."""
+    return record_of(trial_of(number))
+
+
+def record_of(wanted: Trial) -> Record:
     """Return the verdict of a trial, and the rms pull of the sources with many measurements."""
-    wanted, start = trial_of(number), time.process_time()
-    case = wanted.case
+    case, start = wanted.case, time.process_time()
     settings = FitSettings(**case.modelled) if case and wanted.is_modelled else FitSettings()
     try:
         orbit = wanted.simulated()

@@ -77,8 +77,8 @@ def _heaviest_exposures(rows: Rows, camera: Camera) -> tuple[Rows, Camera]:
     for span in np.unique(camera.span):
         of_span = np.flatnonzero((camera.span == span) & (of_exposure > 0.0))
         of_span = of_span[np.argsort(camera.time[of_span], kind="stable")]
-        count = min(max(each, _LEAST_EXPOSURES), len(of_span))
-        if count == len(of_span):
+        count = max(each, _LEAST_EXPOSURES)
+        if len(np.unique(camera.time[of_span])) <= count:
             factor[of_span] = 1.0
             continue
         nodes = gauss_quadrature(camera.time[of_span], of_exposure[of_span], count)
@@ -88,7 +88,9 @@ def _heaviest_exposures(rows: Rows, camera: Camera) -> tuple[Rows, Camera]:
             heaviest = group[np.argmax(is_heavy)]
             time[heaviest], factor[heaviest] = node, weight / of_exposure[heaviest]
     some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
-    phase = camera.phase + (time - camera.time) * np.ptp(camera.phase) / np.ptp(camera.time)
+    # All times are the same, with a single exposure among them.
+    rate = np.ptp(camera.phase) / max(float(np.ptp(camera.time)), 1e-12)
+    phase = camera.phase + rate * (time - camera.time)
     some = some._replace(weight=some.weight * factor[some.exposure])
     return some, camera._replace(time=time, phase=phase)
 

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from solver.results.diagnosis import sample
-from solver.results.diagnosis.sample import gauss_quadrature
+from solver.results.diagnosis.rows import Camera, Rows
+from solver.results.diagnosis.sample import gauss_quadrature, sample_of
 
 
 def test_sources_of_a_sample_are_spread_over_the_sky():
@@ -34,3 +35,26 @@ def test_quadrature_is_exact_for_polynomials(count):
     assert np.all(weights > 0.0)
     for degree in range(2 * count):
         assert weights @ nodes**degree == pytest.approx(weight @ time**degree, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize("time", [[-0.5], [0.0] * 30, [-0.5, *[0.5] * 29]], ids=len)
+def test_exposures_of_few_different_times_are_all_taken(time):
+    """One exposure, or many that a table gives the same time."""
+    number, stars = len(time), 3
+    camera = Camera(*[None] * len(Camera._fields))._replace(
+        time=np.array(time),
+        phase=2.0 * np.array(time),
+        span=np.zeros(number, dtype=int),
+    )
+    exposure = np.repeat(np.arange(number), stars)
+    rows = Rows(*[exposure] * len(Rows._fields))._replace(
+        source=np.tile(np.arange(stars), number),
+        first=stars * np.arange(number + 1),
+        weight=np.ones(number * stars),
+    )
+    found = sample_of(rows, camera, pd.DataFrame({"ra": np.zeros(stars)}))
+    assert found.share == 1.0
+    assert found.parts[0].n == rows.n
+    np.testing.assert_array_equal(found.parts[0].weight, rows.weight)
+    np.testing.assert_array_equal(found.camera.time, camera.time)
+    np.testing.assert_array_equal(found.camera.phase, camera.phase)

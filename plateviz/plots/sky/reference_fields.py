@@ -106,8 +106,8 @@ DIAGNOSTICS = (
         "a star is in few fields: with two, one in three is above it. A large point is a star "
         "that is elsewhere in one field: another star, a double one, or wrong measurements. Many "
         "points above the line mean that distortion or detectors change between fields.",
-        OrbitWorkspace.SKY,
-        67,
+        OrbitWorkspace.TRENDS,
+        76,
         _plot,
         equation=(
             "scatter² = Σ W (p − p̄)² / Σ W over the fields, with the mean position p of a field "

@@ -1,7 +1,5 @@
 """Products of the patterns with the residuals, over all measurements."""
 
-import itertools
-
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -48,16 +46,22 @@ def _of_terms(patterns: Patterns, rows: Rows, vector: np.ndarray) -> np.ndarray:
     """
     size, n_exp = max(patterns.degrees) + 1, len(rows.first) - 1
     sums = np.empty((2, n_exp, size, size))
-    powers = np.empty((3, size, max(np.diff(rows.first), default=0)))
-    for e, (first, last) in enumerate(itertools.pairwise(rows.first)):
-        in_x, in_y, weighted = powers[:, :, : last - first]
-        in_x[0], in_y[0] = 1.0, 1.0
-        for k in range(1, size):
-            np.multiply(in_x[k - 1], rows.at[first:last, 0], out=in_x[k])
-            np.multiply(in_y[k - 1], rows.at[first:last, 1], out=in_y[k])
-        for axis in (0, 1):
-            np.multiply(in_x, vector[axis, first:last], out=weighted)
-            np.matmul(weighted, in_y.T, out=sums[axis, e])
+    blocks = rows.blocks()
+    most = max((rows.first[b.stop] - rows.first[b.start] for b in blocks), default=0)
+    powers = np.empty((3, size, most))
+    for block in blocks:
+        of_block = slice(rows.first[block.start], rows.first[block.stop])
+        x, y = rows.at[of_block].T
+        along_x, along_y, in_y = powers[:, :, : len(x)]
+        along_x[0], along_y[0] = vector[:, of_block]
+        in_y[0] = 1.0
+        for one, at in ((along_x, x), (along_y, x), (in_y, y)):
+            for k in range(1, size):
+                np.multiply(one[k - 1], at, out=one[k])
+        for e in block:
+            own = slice(*(rows.first[e : e + 2] - of_block.start))
+            np.matmul(along_x[:, own], in_y[:, own].T, out=sums[0, e])
+            np.matmul(along_y[:, own], in_y[:, own].T, out=sums[1, e])
     polynomials = np.zeros((size, size))
     for degree in range(size):
         polynomials[degree, : degree + 1] = legendre.leg2poly(np.eye(size)[degree, : degree + 1])
@@ -82,10 +86,10 @@ def _of_pixels(
     """Return the products of the functions of the pixel phase and of the magnitude."""
     found = []
     for axis, along in enumerate(on_detector):
-        # With the tangent of half the angle: one function instead of two.
-        tangent = np.tan(np.pi * rows.pixel[:, axis])
-        share = along / (1.0 + tangent * tangent)
-        found += [2.0 * (tangent @ share), 2.0 * share.sum() - along.sum()]
+        # Seven digits of the place within the pixel are plenty, and take a tenth of the time.
+        pixel = rows.pixel[:, axis]
+        angle = (2.0 * np.pi * (pixel - np.rint(pixel))).astype(np.float32)
+        found += [np.sin(angle) @ along, np.cos(angle) @ along]
     if patterns.has_magnitude:
         faintness = patterns.faintness.take(rows.source)
         for axis, along in enumerate(on_detector):

@@ -92,13 +92,37 @@ def against_catalogue(rows: pd.DataFrame) -> AgainstCatalogue:
     prior = covariance(rows, "prior_sigma_ra", "prior_sigma_dec", "prior_corr")
     marginal = covariance(rows, "sigma_ra_marginal", "sigma_dec_marginal", "corr_marginal")
     offset = rows[["offset_ra", "offset_dec"]].to_numpy(dtype=float)
-    inverse_root = np.linalg.inv(np.linalg.cholesky(prior))
+    inverse_root = _inverse_root(prior)
     share = np.eye(2) - inverse_root @ marginal @ inverse_root.transpose(0, 2, 1)
-    known = np.linalg.eigvalsh(share)[:, 0] > _LEAST_SHARE
-    scaled = (inverse_root[known] @ offset[known, :, None])[:, :, 0]
-    shares, axes = np.linalg.eigh(share[known])
+    shares, axes = _eigenvectors(share)
+    scaled = (inverse_root @ offset[:, :, None])[:, :, 0]
     along = np.einsum("nik,ni->nk", axes, scaled)
-    return AgainstCatalogue(place[known], along, shares, axes, inverse_root[known])
+    known = shares[:, 0] > _LEAST_SHARE
+    return AgainstCatalogue(
+        *(of_all[known] for of_all in (place, along, shares, axes, inverse_root))
+    )
+
+
+def _inverse_root(matrices: np.ndarray) -> np.ndarray:
+    """Return the inverses of the lower Cholesky factors of matrices of shape (n, 2, 2)."""
+    first, both, second = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    above = np.sqrt(first)
+    below = np.sqrt(second - both**2 / first)
+    left, none = -both / (first * below), np.zeros_like(both)
+    return np.stack([1.0 / above, none, left, 1.0 / below], axis=-1).reshape(-1, 2, 2)
+
+
+def _eigenvectors(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the eigenvalues, ascending, and eigenvectors of symmetric matrices of shape (n, 2, 2).
+
+    As `numpy.linalg.eigh` does, ten times as fast for many.
+    """
+    first, both, second = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    middle, half = 0.5 * (first + second), 0.5 * (first - second)
+    radius, angle = np.hypot(half, both), 0.5 * np.arctan2(both, half)
+    c, s = np.cos(angle), np.sin(angle)
+    axes = np.stack([-s, c, c, s], axis=-1).reshape(-1, 2, 2)
+    return np.stack([middle - radius, middle + radius], axis=-1), axes
 
 
 def _chi2(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray, factor: float) -> np.ndarray:

@@ -18,6 +18,8 @@ from solver.units import MINUTES_PER_DAY, RAD_PER_MAS
 FAR = 6.0
 # Median of the larger of two chi2 with one degree of freedom each.
 _MEDIAN_OF_LARGER = 1.1063
+# Of exposures whose functions are computed together: less would be many small steps.
+_ROWS_OF_BLOCK = 8_192
 # Residuals of which the fit leaves less than this share are rounding errors.
 _LEAST_LEFT = 1e-6
 
@@ -57,6 +59,12 @@ class Rows(NamedTuple):
     def n(self) -> int:
         """Number of measurements."""
         return len(self.exposure)
+
+    def blocks(self) -> list[range]:
+        """Return the exposures in blocks, whose columns of functions stay in the cache."""
+        each = int(_ROWS_OF_BLOCK / max(np.diff(self.first).max(initial=1), 1))
+        n, step = len(self.first) - 1, max(each, 1)
+        return [range(start, min(start + step, n)) for start in range(0, n, step)]
 
     def of(self, chosen: np.ndarray | slice) -> "Rows":
         """Return the chosen rows, ascending indices or a slice."""
@@ -132,9 +140,12 @@ def _rows(table: SortedTable, columns: ResidualColumns, camera: Camera) -> Rows:
     um = camera.pitch.T.take(detector, axis=1).T
     first = np.searchsorted(table.exposure, np.arange(len(camera.time) + 1))
     left = 1.0 - np.clip(0.5 * table.column("leverage"), 0.0, 1.0)
-    squares = np.square(columns.residual / columns.sigma)
-    is_far = _far(squares.max(axis=1), left, first)
-    used = columns.residual * um * ~is_far[:, None]
+    # Each axis is contiguous: sums of the two are ten times as fast as along the second one.
+    square_x, square_y = np.square(columns.residual / columns.sigma).T
+    is_far = _far(np.maximum(square_x, square_y), left, first)
+    used = columns.residual * um
+    used[is_far] = 0.0
+    sigma_x, sigma_y = (columns.sigma * um).T
     return Rows(
         exposure=table.exposure,
         detector=detector,
@@ -144,9 +155,9 @@ def _rows(table: SortedTable, columns: ResidualColumns, camera: Camera) -> Rows:
         pixel=columns.pixel,
         local=columns.pixel / camera.half.T.take(detector, axis=1).T,
         residual=onto_focal_plane(used, camera.turn, detector),
-        weight=1.0 / np.square(columns.sigma * um).mean(axis=1),
+        weight=2.0 / (np.square(sigma_x) + np.square(sigma_y)),
         left=left,
-        chi2=squares.sum(axis=1),
+        chi2=square_x + square_y,
         is_far=is_far,
     )
 

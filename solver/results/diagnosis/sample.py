@@ -10,8 +10,8 @@ from numpy.polynomial import legendre
 
 from solver.results.diagnosis.rows import Camera, Rows
 
-# Measurements of a sample, and exposures of each span.
-_MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
+# Measurements of a sample, and exposures of each span, and in all.
+_MOST_ROWS, _LEAST_EXPOSURES, _LEAST_IN_ALL = 6_000, 2, 8
 # Measurements of a sample that has all exposures.
 _MOST_OF_ALL_EXPOSURES = 60_000
 # Of sums of weights, relative.
@@ -71,13 +71,14 @@ def sample_of(
 
 def _heaviest_exposures(rows: Rows, camera: Camera) -> tuple[Rows, Camera]:
     """Return the rows of some exposures, with the weights and times at which they stand for all."""
-    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.span.max() + 1)), 0)
+    spans = int(camera.span.max()) + 1
+    each = int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / spans)
+    count = max(each, _LEAST_EXPOSURES, -(-_LEAST_IN_ALL // spans))
     of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
     factor, time = np.zeros(len(camera.time)), camera.time.copy()
     for span in np.unique(camera.span):
         of_span = np.flatnonzero((camera.span == span) & (of_exposure > 0.0))
         of_span = of_span[np.argsort(camera.time[of_span], kind="stable")]
-        count = max(each, _LEAST_EXPOSURES)
         if len(np.unique(camera.time[of_span])) <= count:
             factor[of_span] = 1.0
             continue

@@ -46,7 +46,7 @@ def scatter_tests(
     without : indices of exposures to leave out
     """
     used = ~rows.is_far
-    if without is not None:
+    if without is not None and len(without):
         used &= ~np.isin(rows.exposure, without)
     chi2, dof = used * rows.chi2, used * 2.0 * rows.left
     total, freedom = float(chi2.sum()) - explained, max(float(dof.sum()), 1.0)
@@ -54,18 +54,18 @@ def scatter_tests(
     whole = float(_normalised(np.array([total]), np.array([freedom]))[0])
     spread = float(np.sqrt(2.0 / freedom))
     # Groups are compared with each other: what is explained is in all of them.
-    typical = max(float(chi2.sum()) / freedom, 1e-300)
+    relative = chi2 / max(float(chi2.sum()) / freedom, 1e-300)
     found = [
         Scatter("noise", scale, 1.0, spread, log_chance_normal(whole), freedom),
-        _dispersion("exposures", rows.exposure, chi2 / typical, dof),
-        _dispersion("sources", rows.source, chi2 / typical, dof),
-        _dispersion("detectors", rows.detector, chi2 / typical, dof),
+        _dispersion("exposures", rows.exposure, relative, dof),
+        _dispersion("sources", rows.source, relative, dof),
+        _dispersion("detectors", rows.detector, relative, dof),
     ]
-    slope = _slope(rows.source, magnitude, chi2 / typical, dof)
+    slope = _slope(rows.source, magnitude, relative, dof)
     count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
     chance = log_chance_poisson(count, expected)
     far = Scatter("outliers", count, expected, float(np.sqrt(expected)), chance)
-    tails = _kurtosis(rows.exposure[used], chi2[used], dof[used])
+    tails = _kurtosis(rows.exposure, chi2, dof)
     return [*found, *([slope] if slope else []), far, tails]
 
 
@@ -95,17 +95,17 @@ def _kurtosis(exposure: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatte
     times that mean (Mardia 1970). Exposures of different noise, together, would have one.
     """
     known = dof > _LEAST_DOF
-    exposure, half = exposure[known], chi2[known] / dof[known]
-    counts = np.bincount(exposure)
-    mean = np.bincount(exposure, half) / np.maximum(counts, 1)
-    half = half / np.maximum(mean, 1e-300)[exposure]
+    half = np.divide(chi2, dof, out=np.zeros(len(chi2)), where=known)
+    counts = np.bincount(exposure, known)
+    mean = np.bincount(exposure, half) / np.maximum(counts, 1.0)
+    squares = np.bincount(exposure, half * half) / np.maximum(mean**2, 1e-300)
     # Squares of exponential deviates over the mean of n of them are 2 n / (n + 1) on average.
-    squares = half**2 * ((counts + 1.0) / np.maximum(counts, 1))[exposure]
-    n = max(len(half), 1)
-    value = 3.0 * float(np.sum(0.5 * squares - 2.0 * half + 1.0)) / n
+    squares *= (counts + 1.0) / np.maximum(counts, 1.0)
+    n = max(float(counts.sum()), 1.0)
+    value = 3.0 * float(np.sum(0.5 * squares - counts)) / n
     scatter = 3.0 / float(np.sqrt(n))
     chance = log_chance_normal(value / scatter)
-    return Scatter("kurtosis", value, 0.0, scatter, chance, float(n))
+    return Scatter("kurtosis", value, 0.0, scatter, chance, n)
 
 
 def _slope(

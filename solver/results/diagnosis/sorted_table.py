@@ -39,8 +39,8 @@ class SortedTable(NamedTuple):
     def source_index(self, ids: np.ndarray) -> np.ndarray:
         """Return the place of the source of each row among ascending ids, shape (n,)."""
         # Few ids are searched for: all of them would take ten times as long.
-        source, known = pd.factorize(self.column("source_id"))
-        return np.searchsorted(ids, known)[source]
+        source, known = pd.factorize(self.stored["source_id"].to_numpy())
+        return np.searchsorted(ids, known).take(source).take(self.order)
 
 
 class ResidualColumns(NamedTuple):

@@ -41,25 +41,23 @@ def swapped(result: FitResult) -> Swapped:
     near their places.
     """
     table = result.residuals
-    # Each axis is contiguous.
-    residual, at, sigma = (
-        np.stack([table[name].to_numpy(dtype=float) for name in names]).T
-        for names in (("residual_x", "residual_y"), ("nx", "ny"), ("sx", "sy"))
-    )
-    chi2 = np.square(residual / sigma).sum(axis=1)
+    axes = [
+        [table[f"{name}{axis}"].to_numpy(dtype=float) for name in ("residual_", "s", "n")]
+        for axis in "xy"
+    ]
+    chi2 = np.sum([np.square(residual / sigma) for residual, sigma, _ in axes], axis=0)
     chosen = np.flatnonzero(chi2 > FAR**2)
-    distance = np.zeros(len(table))
-    distance[chosen] = np.hypot(*residual[chosen].T)
-    area = float(np.prod(np.ptp(at, axis=0)))
+    residual, at = (np.stack([axis[k][chosen] for axis in axes], axis=1) for k in (0, 2))
+    area = float(np.prod([np.ptp(of_all) for *_, of_all in axes]))
+    distance = np.hypot(*residual.T)
     share = np.pi * (_NEAR * distance) ** 2 / max(area, 1e-300)
     pairs, expected = [], 0.0
     keys = [result.exposure_index[chosen], table["detector_id"].to_numpy()[chosen]]
-    for group in pd.Series(chosen).groupby(keys).indices.values():
-        rows = chosen[group]
+    for rows in pd.Series(chosen).groupby(keys).indices.values():
         if len(rows) < 2:
             continue
         a, b = _pairs(at[rows], at[rows] - residual[rows], _NEAR * distance[rows])
-        pairs += [np.stack([rows[a], rows[b]], axis=1).ravel()]
+        pairs += [chosen[np.stack([rows[a], rows[b]], axis=1).ravel()]]
         # Each is there by chance.
         expected += 0.5 * float(np.minimum(share[rows], 1.0).sum()) ** 2
     found = np.concatenate([np.empty(0, dtype=np.int64), *pairs])

@@ -150,6 +150,7 @@ def test_sample_of_the_sources_stands_for_all(clean, monkeypatch):
         _, found = covariance_of_products(clean, camera, rows, patterns)
         return found[np.ix_(above.columns, above.columns)]
 
+    monkeypatch.setattr(sample, "_LEAST_EXPOSURES", 4)
     monkeypatch.setattr(sample, "_MOST_ROWS", 5000)
     of_all = left()
     monkeypatch.setattr(sample, "_MOST_ROWS", 3000)
@@ -159,18 +160,17 @@ def test_sample_of_the_sources_stands_for_all(clean, monkeypatch):
     sampled = np.isin(rows.source, np.concatenate([part.source for part in halves.parts]))
     both = sample_of(rows.of(np.flatnonzero(sampled)), camera, clean.sources)
     of_sample = left()
-    monkeypatch.setattr(
-        projection, "sample_of", lambda *_, **__: both._replace(weight=halves.weight)
-    )
-    rise, without = (
-        np.trace(np.linalg.solve(one, of_all)) / len(of_all) for one in (of_sample, left())
-    )
+    both = both._replace(weight=halves.weight)
+    monkeypatch.setattr(projection, "sample_of", lambda *_, **__: both)
+    ratios = (np.linalg.solve(one, of_all) for one in (of_sample, left()))
+    rise, without = (ratio.trace() / len(of_all) for ratio in ratios)
     assert rise == pytest.approx(1.0, abs=0.1)
     assert rise - 1.0 < 0.6 * (without - 1.0)
 
 
-@pytest.mark.parametrize("subject", ["shift", "turn", "bend"])
-def test_few_exposures_stand_for_all(clean, monkeypatch, subject):
+@pytest.mark.parametrize("of_span", [2, 4])
+@pytest.mark.parametrize("subject", ["shift", "turn", "bend", "step"])
+def test_few_exposures_stand_for_all(clean, monkeypatch, subject, of_span):
     """Their times and weights are those of a quadrature: detectors that move in a field show it."""
     camera, rows = camera_rows(clean)
     patterns = Patterns(camera, ORDER, source_magnitudes(clean))
@@ -179,10 +179,10 @@ def test_few_exposures_stand_for_all(clean, monkeypatch, subject):
         monkeypatch.setattr(sample, "_MOST_ROWS", most)
         return covariance_of_products(clean, camera, rows, patterns)[1]
 
-    few, of_all = left(rows.n // 6 + len(camera.time)), left(rows.n)
+    of_exposure, spans = rows.n // len(camera.time) + 1, camera.span.max() + 1
+    few, of_all = left(of_span * spans * of_exposure), left(rows.n)
     for family in (one for one in patterns.families if one.subject == subject):
-        square = np.ix_(family.columns, family.columns)
-        of_few, whole = few[square], of_all[square]
+        of_few, whole = (one[np.ix_(family.columns, family.columns)] for one in (few, of_all))
         known = np.diag(whole) > 0.02 * np.diag(whole).max()
         chi2 = np.trace(np.linalg.solve(of_few[known][:, known], whole[known][:, known]))
         assert chi2 == pytest.approx(known.sum(), rel=0.03)

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from scipy.special import chdtri
 
+from solver.results.diagnosis import references
 from solver.results.diagnosis.references import catalogue_chi2
 
 STARS = 4000
@@ -87,3 +88,18 @@ def test_wrong_stars_stand_out_though_they_make_the_errors_of_all_look_larger():
     far = catalogue_chi2(rows).rescaled > LIMIT
     assert far[wrong].all()
     assert far.sum() == len(wrong)
+
+
+def test_matrices_of_two_rows_are_factored_as_by_lapack():
+    random = np.random.default_rng(4)
+    roots = random.normal(size=(50, 2, 2))
+    matrices = roots @ roots.transpose(0, 2, 1)
+    # Alike along both axes, and along one axis only.
+    matrices[:2] = np.eye(2), np.diag([1.0, 4.0])
+    values, axes = references._eigenvectors(matrices)
+    np.testing.assert_allclose(values, np.linalg.eigvalsh(matrices), atol=1e-12)
+    np.testing.assert_allclose(
+        (axes * values[:, None]) @ axes.transpose(0, 2, 1), matrices, atol=1e-12
+    )
+    inverse = np.linalg.inv(np.linalg.cholesky(matrices))
+    np.testing.assert_allclose(references._inverse_root(matrices), inverse, rtol=1e-6, atol=1e-9)

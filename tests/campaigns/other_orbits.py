@@ -35,7 +35,7 @@ def main() -> int:
         records = [record_of(trial) for trial in trials]
         right = sum(named(case, records))
         write(
-            f"| {case.title} | {case.text(arguments.factor).partition('=')[2]} |"
+            f"| {case.title} | {case.words(arguments.factor)} |"
             f" {rms_pull(records):.3f} | {len(records)} | {sum(seen(records))} | {right} |"
         )
     return 0

@@ -51,10 +51,16 @@ class DefectCase:
 
     def text(self, factor: float) -> str:
         """Return the defect as a setting of a survey."""
+        return format_defect(self.name, self.at(factor))
+
+    def words(self, factor: float) -> str:
+        """Return the amplitude at a factor, with its unit."""
+        return f"{self.at(factor):.3g} {BY_NAME[self.name].unit}".rstrip()
+
+    def at(self, factor: float) -> float:
+        """Return the amplitude at a factor, in the unit of its table."""
         amplitude = factor * self.amplitude
-        if BY_NAME[self.name].is_count:
-            amplitude = max(round(amplitude), 1)
-        return format_defect(self.name, amplitude)
+        return max(round(amplitude), 1) if BY_NAME[self.name].is_count else amplitude
 
 
 CASES = (

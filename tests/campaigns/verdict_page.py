@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.simulate.defects.table import BY_NAME
 from tests.campaigns import verdict_demands as demands
 from tests.campaigns.trials import Record
 from tests.campaigns.verdict_cases import CASES, FACTORS, DefectCase, trial_of
@@ -120,8 +119,7 @@ def _seen_row(case: DefectCase, of_case: _Records) -> str:
         f"{sum(seen(rows))}, {sum(named(case, rows))} of {len(rows)}" if rows else "-"
         for rows in (of_case[factor] for factor in FACTORS)
     ]
-    amplitude = f"{case.amplitude:g} {BY_NAME[case.name].unit}".rstrip()
-    return _row(case.title, amplitude, *cells)
+    return _row(case.title, case.words(1.0), *cells)
 
 
 def _named_row(case: DefectCase, factor: float, records: Sequence[Record]) -> str:

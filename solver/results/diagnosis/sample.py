@@ -10,8 +10,10 @@ from numpy.polynomial import legendre
 
 from solver.results.diagnosis.rows import Camera, Rows
 
-# Measurements of a sample, and exposures of each span, and in all.
-_MOST_ROWS, _LEAST_EXPOSURES, _LEAST_IN_ALL = 6_000, 2, 8
+# Measurements and sources of a sample: more of them hardly change its sums.
+_MOST_ROWS, _MOST_SOURCES = 12_000, 1_800
+# Exposures of each span, and in all, where these are more measurements than that.
+_LEAST_EXPOSURES, _LEAST_IN_ALL = 2, 8
 # Measurements of a sample that has all exposures.
 _MOST_OF_ALL_EXPOSURES = 60_000
 # Of sums of weights, relative.
@@ -54,13 +56,15 @@ def sample_of(
     all_exposures : of few sources then; for what depends on the time in detail
     """
     some, camera = (rows, camera) if all_exposures else _heaviest_exposures(rows, camera)
-    most = _MOST_OF_ALL_EXPOSURES if all_exposures else _MOST_ROWS
     weight, counts = float(some.weight.sum()), np.bincount(some.source, minlength=len(sources))
-    if some.n <= most:
+    if all_exposures:
+        step = some.n / _MOST_OF_ALL_EXPOSURES
+    else:
+        step = max(some.n / _MOST_ROWS, np.count_nonzero(counts) / _MOST_SOURCES)
+    if step <= 1.0:
         return Sample([some], camera, weight, 1.0)
     order = _along_the_sky(sources)
     order = order[counts[order] > 0]
-    step = some.n / most
     taken = order[np.arange(0.0, len(order), step).astype(np.intp)]
     parts = [_of_sources(some, half, len(sources)) for half in (taken[::2], taken[1::2])]
     exposures = [np.flatnonzero(np.diff(part.first)) for part in (some, *parts)]

@@ -1,5 +1,8 @@
 """Exceptions: invalid input, cancelled work and failed fits."""
 
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
 
 class InputError(ValueError):
     """Invalid input, described in one message for the user.
@@ -26,6 +29,52 @@ class CancelledError(RuntimeError):
 
 class FitError(RuntimeError):
     """A fit that has no result; the message gives the reason."""
+
+
+class LikelyCause(NamedTuple):
+    """What most likely left a fit without a solution.
+
+    Attributes
+    ----------
+    name : short and unique, for programs
+    title : the cause as a clause
+    words : the evidence, as a sentence without its full stop
+    action : what to do
+    is_misfit : whether the evidence is the size of the residuals
+    """
+
+    name: str
+    title: str
+    words: str
+    action: str
+    is_misfit: bool = False
+
+    def sentence(self) -> str:
+        """Return the evidence and what to do as text."""
+        return f"{self.words}: {self.action}."
+
+
+class NoSolutionError(FitError):
+    """A fit that ended where no uncertainties exist, and so without tables.
+
+    Attributes
+    ----------
+    summary : what is known of it; keys as in `solver.results.summary`
+    chi2 : of the measurements at its last point; perhaps no number
+    cause : what is likely the matter
+    """
+
+    def __init__(
+        self, message: str, summary: Mapping[str, Any], chi2: float, cause: LikelyCause
+    ) -> None:
+        """Take the message for the user, and the attributes."""
+        # All of them, so that it can be pickled.
+        super().__init__(message, summary, chi2, cause)
+        self.summary, self.chi2, self.cause = summary, chi2, cause
+
+    def __str__(self) -> str:
+        """Return the message."""
+        return str(self.args[0])
 
 
 class DistrustError(FitError):

@@ -9,9 +9,10 @@ from plateviz.cache import keep_compilations
 from plateviz.cli.output import print_agreement, print_fit, print_json, print_orders
 from plateviz.solving.origin import OrbitFiles
 from plateviz.solving.progress import Reporter, reporting
+from plateviz.verdict.no_solution import no_solution_summary
 from plateviz.verdict.verdict import with_verdict
 from solver.data.settings import COUNTED, ENGINES, FitSettings
-from solver.errors import DistrustError, FitError, InputError
+from solver.errors import DistrustError, FitError, InputError, NoSolutionError
 from solver.io.outputs import FITS_SUFFIXES, check_output
 from solver.runtime.memory import keep_memory
 
@@ -62,29 +63,35 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
     InputError
         If an input or an output is not as expected.
     FitError
-        If a fit has not converged or the engines disagree.
+        If a fit has no solution or has not converged, or the engines disagree.
     DistrustError
         If a solution should not be trusted, unless the request accepts that.
     """
     start = time.perf_counter()
     keep_memory()
     outputs = _checked_outputs(request)
-    fits = {}
-    with reporting("reading the orbit") as reporter:
-        focal_plane, data = request.files.read_instrument(), request.files.read(request.orbit)
-        read = time.perf_counter() - start
-        reporter.say("loading the solver")
-        keep_compilations()
-        from solver.fit import OrbitFitter
+    fits: dict[str, _Fitted] = {}
+    try:
+        with reporting("reading the orbit") as reporter:
+            focal_plane, data = request.files.read_instrument(), request.files.read(request.orbit)
+            read = time.perf_counter() - start
+            reporter.say("loading the solver")
+            keep_compilations()
+            from solver.fit import OrbitFitter
 
-        fitter = OrbitFitter(data, focal_plane)
-        for engine, output in outputs.items():
-            result = with_verdict(_fit(fitter, data, request, engine, reporter))
-            reporter.say("writing the result")
-            seconds = {"read": read, **dict(result.summary["seconds"])}
-            seconds["write"] = _write(result, output, request, engine)
-            summary = {**result.summary, "seconds": seconds, "output": str(output)}
-            fits[engine] = _Fitted(result, summary | _orders(result), output)
+            fitter = OrbitFitter(data, focal_plane)
+            for engine, output in outputs.items():
+                result = with_verdict(_fit(fitter, data, request, engine, reporter))
+                reporter.say("writing the result")
+                seconds = {"read": read, **dict(result.summary["seconds"])}
+                seconds["write"] = _write(result, output, request, engine)
+                summary = {**result.summary, "seconds": seconds, "output": str(output)}
+                fits[engine] = _Fitted(result, summary | _orders(result), output)
+    except NoSolutionError as error:
+        if as_json:
+            failed = no_solution_summary(error, request.settings)
+            _print_json({**_summaries(fits), failed["engine"]: failed}, [])
+        raise
     _report(fits, as_json)
     if not request.accept:
         _require_trust(fits)
@@ -163,7 +170,7 @@ def _report(fits: Mapping[str, _Fitted], as_json: bool) -> None:
     """Print the fits; `FitError` if one has not converged, or if they disagree."""
     rows = _agreement(fits)
     if as_json:
-        _print_json(fits, rows)
+        _print_json(_summaries(fits), rows)
     else:
         _print_text(fits, rows)
     _require_convergence(fits)
@@ -179,10 +186,14 @@ def _agreement(fits: Mapping[str, _Fitted]) -> "list[Agreement]":
     return compare_engines({engine: fit.result for engine, fit in fits.items()})
 
 
-def _print_json(fits: Mapping[str, _Fitted], rows: "list[Agreement]") -> None:
-    summaries = {engine: fit.summary for engine, fit in fits.items()}
+def _summaries(fits: Mapping[str, _Fitted]) -> dict[str, dict[str, Any]]:
+    return {engine: fit.summary for engine, fit in fits.items()}
+
+
+def _print_json(summaries: Mapping[str, dict[str, Any]], rows: "list[Agreement]") -> None:
+    """Print the summary of the first engine, and all of them if there are several."""
     agreement = [{**row._asdict(), "agrees": row.agrees} for row in rows]
-    more = {"engines": summaries, "agreement": agreement} if rows else {}
+    more = {"engines": summaries, "agreement": agreement} if len(summaries) > 1 else {}
     print_json({**next(iter(summaries.values())), **more})
 
 

@@ -40,6 +40,11 @@ def narrowed_priors(settings: FitSettings) -> list[str]:
     return [one for one in settings.prior_widths if settings.width(one) < BY_NAME[one].width]
 
 
+def widened_priors(settings: FitSettings) -> list[str]:
+    """Return the groups of parameters whose priors were set to more than their usual widths."""
+    return [one for one in settings.prior_widths if settings.width(one) > BY_NAME[one].width]
+
+
 def usual_priors(names: Iterable[str]) -> tuple[str, ...]:
     """Return the options of a fit that give groups of parameters their usual prior widths."""
     return tuple(_option(name, BY_NAME[name].width) for name in names)

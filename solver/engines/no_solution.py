@@ -6,6 +6,7 @@ import numpy as np
 
 from solver.data.result import FitStatus
 from solver.engines.gauss_newton import Mode
+from solver.errors import LikelyCause
 from solver.linear.source_elimination import eliminate_sources
 from solver.problem.problem import Problem
 
@@ -21,8 +22,8 @@ class _Numbers(NamedTuple):
     half_width_pix: float
 
 
-def likely_cause(problem: Problem, mode: Mode) -> str:
-    """Return what most likely left a fit without a solution, and what to do, as sentences.
+def likely_cause(problem: Problem, mode: Mode) -> LikelyCause:
+    """Return what most likely left a fit without a solution, and what to do.
 
     Parameters
     ----------
@@ -30,26 +31,38 @@ def likely_cause(problem: Problem, mode: Mode) -> str:
     """
     numbers = _numbers(problem, mode)
     if mode.status is FitStatus.NOT_FINITE or not np.isfinite(numbers.residual_pix):
-        return (
+        return LikelyCause(
+            "not-finite",
+            "an estimate of an exposure, or a measurement, is no number or in a wrong unit",
             "Some estimate of an exposure, or a measurement, is likely no number or in a wrong "
-            "unit: check obstime (MJD), ra_est, dec_est and pa_est (deg), focal_length (um)."
+            "unit",
+            "check obstime (MJD), ra_est, dec_est and pa_est (deg), focal_length (um)",
         )
     if numbers.residual_pix > _NEAR * numbers.half_width_pix:
-        return (
+        return LikelyCause(
+            "wrong-estimates",
+            "an estimate of the exposures is wrong",
             f"The stars are predicted some {numbers.residual_pix:.0f} pixels from where they were "
-            "measured, so an estimate of the exposures is likely wrong: check ra_est, dec_est and "
-            "pa_est (deg), focal_length (um), and that source_id means the same in both files."
+            "measured, so an estimate of the exposures is likely wrong",
+            "check ra_est, dec_est and pa_est (deg), focal_length (um), and that source_id means "
+            "the same in both files",
+            is_misfit=True,
         )
     if _tight_priors_hold_it(problem, mode):
-        return (
+        return LikelyCause(
+            "outweighed-priors",
+            "the measurements outweigh the priors so far that rounding hides these",
             f"The measurements have uncertainties sx, sy of {numbers.sigma_pix:.2g} pixel (median) "
-            "and outweigh the priors so far that rounding hides these: check the unit of sx and "
-            "sy, or narrow the priors that were widened."
+            "and outweigh the priors so far that rounding hides these",
+            "check the unit of sx and sy, or narrow the priors that were widened",
         )
-    return (
-        f"Reference sources measured: {problem.sources['is_reference'].sum()}. Narrow a prior that "
-        "holds what they leave open "
-        "(focal_length, the detectors' places), lower the order, or add reference sources."
+    return LikelyCause(
+        "open-direction",
+        "the priors are too wide for what was measured",
+        f"Reference sources alone, {problem.sources['is_reference'].sum()} measured, do not hold "
+        "the solution",
+        "narrow a prior that holds what they leave open (focal_length, the detectors' places), "
+        "lower the order, or add reference sources",
     )
 
 

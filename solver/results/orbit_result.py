@@ -12,11 +12,12 @@ from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
+from solver.engines.gauss_newton import Mode
 from solver.engines.no_solution import likely_cause
-from solver.errors import FitError
+from solver.errors import NoSolutionError
 from solver.problem.problem import Problem
 from solver.results.eigenmode_tables import eigenmode_tables
-from solver.results.summary import summarise, truth_summary
+from solver.results.summary import known_numbers, summarise, truth_summary
 from solver.results.tables import (
     SolvedProblem,
     calibration_table,
@@ -79,12 +80,12 @@ def partial_result(
 
     Raises
     ------
-    FitError
+    NoSolutionError
         If no solution with uncertainties exists; the message gives the reason.
     """
     mode = estimate.mode
     if mode.reduced is None:
-        raise FitError(f"orbit {data.orbit_id}: {mode.status.value}. {likely_cause(problem, mode)}")
+        raise _no_solution(problem, mode, settings)
     solved = time.perf_counter()
     solution = solved_problem(problem, estimate, mode.reduced)
     with ThreadPoolExecutor(1) as helper:
@@ -119,6 +120,13 @@ def partial_result(
         instrument=instrument,
     )
     return PartialResult(result, solution, instrument)
+
+
+def _no_solution(problem: Problem, mode: Mode, settings: FitSettings) -> NoSolutionError:
+    """Return the error of a fit that ended where no uncertainties exist."""
+    summary, cause = known_numbers(problem, mode, settings), likely_cause(problem, mode)
+    message = f"orbit {summary['orbit']}: {mode.status.value}. {cause.sentence()}"
+    return NoSolutionError(message, summary, mode.equations.gradient.chi2, cause)
 
 
 def _n_reference_excluded(data: OrbitData, settings: FitSettings) -> int:

@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 
 from solver.data.settings import FitSettings
+from solver.engines.gauss_newton import Mode
 from solver.model.directions import offsets_mas
+from solver.problem.problem import Problem
 from solver.results.diagnostics import (
     deviation_freedom,
     effective_parameters,
@@ -14,6 +16,25 @@ from solver.results.diagnostics import (
     normalised_deviation,
 )
 from solver.results.tables import SolvedProblem
+
+
+def known_numbers(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:
+    """Return the part of the summary that needs no uncertainties."""
+    return {
+        "converged": mode.status.is_solution,
+        "reason": mode.status.value,
+        "engine": settings.engine,
+        "order": settings.order,
+        "distortion_scale_um": float(problem.geometry.distortion_scale),
+        "iterations": mode.trace[-1].iteration if mode.trace else 0,
+        "orbit": int(problem.exposures["orbit_id"].iloc[0]),
+        "epoch_mjd": problem.epoch,
+        "n_measurements": problem.n_obs,
+        "n_sources": problem.n_src,
+        "n_reference": int(problem.sources["is_reference"].sum()),
+        "n_exposures": len(problem.exposures),
+        "n_parameters": problem.layout.size + 2 * problem.n_src,
+    }
 
 
 def summarise(solution: SolvedProblem, settings: FitSettings) -> dict[str, object]:
@@ -31,19 +52,7 @@ def summarise(solution: SolvedProblem, settings: FitSettings) -> dict[str, objec
     log_sigma = float(np.log(problem.measurements.sigma).sum())
     scatter = np.sqrt(np.mean((whitened * problem.measurements.sigma) ** 2, axis=0))
     return {
-        "converged": mode.status.is_solution,
-        "reason": mode.status.value,
-        "engine": settings.engine,
-        "order": settings.order,
-        "distortion_scale_um": float(problem.geometry.distortion_scale),
-        "iterations": mode.trace[-1].iteration,
-        "orbit": int(problem.exposures["orbit_id"].iloc[0]),
-        "epoch_mjd": problem.epoch,
-        "n_measurements": problem.n_obs,
-        "n_sources": problem.n_src,
-        "n_reference": int(is_reference.sum()),
-        "n_exposures": len(problem.exposures),
-        "n_parameters": problem.layout.size + 2 * problem.n_src,
+        **known_numbers(problem, mode, settings),
         "effective_parameters": parameters,
         "chi2": chi2,
         "dof": dof,

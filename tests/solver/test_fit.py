@@ -238,7 +238,7 @@ def test_iteration_limit_is_reported(small_orbit, fit):
 
 def test_singular_orbit_raises(small_orbit, fit):
     names = ("focal_length", "pitch_x", "pitch_y", "detector_x", "detector_y")
-    what = "orbit 7: .* leave a direction of the solution open.*Narrow a prior that holds"
+    what = "orbit 7: .* leave a direction of the solution open.*narrow a prior that holds"
     with pytest.raises(FitError, match=what):
         fit(small_orbit, prior_widths=dict.fromkeys(names, np.inf))
 

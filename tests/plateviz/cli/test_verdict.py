@@ -8,6 +8,9 @@ import pyarrow as pa
 import pytest
 from astropy.io import fits
 
+from plateviz.verdict.verdict import Verdict
+from solver.engines.run_engine import run_engine
+from solver.errors import LikelyCause, NoSolutionError
 from solver.io.parquet import read_frame, write_parquet
 from solver.io.result import read_result
 from solver.io.survey import REFERENCE, measurement_path
@@ -141,6 +144,45 @@ def test_a_fit_that_does_not_converge_has_a_verdict_too(run, orbit, tmp_path):
     assert "--robust" in cause["options"]
     assert len(cause["items"]) > 20
     assert "has not converged" in err
+
+
+# Groups of which one prior has to hold the scale, and one the place of the detectors.
+HOLDING = ("focal_length", "pitch_x", "pitch_y", "detector_x", "detector_y")
+OPEN = [f"--prior={one}=flat" for one in HOLDING]
+
+
+def test_a_fit_without_uncertainties_has_a_verdict_too(run, orbit, tmp_path):
+    code, out, err = run("fit", *orbit, "-o", tmp_path / "r.fits", *OPEN, "--json")
+    assert code == 1
+    assert "plateviz: orbit 1: the data and the priors together leave a direction" in err
+    summary = json.loads(out)
+    assert (summary["orbit"], summary["engine"], summary["converged"]) == (1, "gauss-newton", False)
+    assert summary["n_reference"] == 58
+    verdict = summary["verdict"]
+    assert set(verdict) == set(Verdict._fields)
+    assert verdict["state"] == "bad"
+    cause = verdict["causes"][0]
+    assert cause["name"] == "open-direction"
+    assert cause["options"][0].startswith("--prior focal_length=")
+    assert summary["reason"] in verdict["reasons"][0]
+    assert not (tmp_path / "r.fits").exists()
+
+
+def test_what_other_engines_found_is_told_beside_it(run, orbit, tmp_path, monkeypatch):
+    def without_svi(problem, settings, *given):
+        if settings.engine == "svi":
+            cause = LikelyCause("open-direction", "a title", "words", "do it")
+            raise NoSolutionError("no luck", {"engine": "svi", "reason": "why"}, 0.0, cause)
+        return run_engine(problem, settings, *given)
+
+    monkeypatch.setattr("solver.fit.run_engine", without_svi)
+    options = ["-o", tmp_path / "r.fits", "--engine", "all", "--json"]
+    code, out, err = run("fit", *orbit, *options)
+    assert (code, err.splitlines()[-1]) == (1, "plateviz: no luck")
+    found = json.loads(out)
+    assert found["verdict"]["state"] == "good"
+    assert list(found["engines"]) == ["gauss-newton", "svi"]
+    assert found["engines"]["svi"]["verdict"]["state"] == "bad"
 
 
 @pytest.mark.slow

@@ -19,5 +19,6 @@ def test_wrong_unit_of_the_focal_length_is_named():
     at = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     mode = Mode(*at, None, FitStatus.SINGULAR, [], accumulate(problem, *at))
     cause = likely_cause(problem, mode)
-    assert "pixels from where they were measured" in cause
-    assert "focal_length (um)" in cause
+    assert "pixels from where they were measured" in cause.words
+    assert "focal_length (um)" in cause.action
+    assert cause.is_misfit

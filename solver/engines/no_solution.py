@@ -12,8 +12,8 @@ from solver.problem.problem import Problem
 
 # A start within this share of the largest pixel coordinate is near enough.
 _NEAR = 0.5
-# Priors a hundred times narrower.
-_TIGHTENED = 1e4
+# Priors ten thousand times narrower.
+_TIGHTENED = 1e8
 
 
 class _Numbers(NamedTuple):

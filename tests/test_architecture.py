@@ -70,8 +70,10 @@ LOOSE = {"solver.errors", "solver.units", "solver.fit", "plateviz.cache"}
 USER_INTERFACE = ("panel", "param", "holoviews", "bokeh", "datashader")
 NEVER = {
     "solver": ("plateviz", *USER_INTERFACE),
+    # The verdict is measured on the defects of simulations, and must not know them.
+    "solver.results": ("solver.simulate",),
     "plateviz.tables": USER_INTERFACE,
-    "plateviz.verdict": USER_INTERFACE,
+    "plateviz.verdict": ("solver.simulate", *USER_INTERFACE),
     "plateviz.runs": USER_INTERFACE,
     "plateviz.solving": USER_INTERFACE,
     "plateviz.figures": ("panel", "param"),

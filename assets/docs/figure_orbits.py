@@ -143,6 +143,16 @@ def _trailed(rows: pd.DataFrame, random: np.random.Generator) -> None:
         rows.loc[smeared, "nx"] += 0.02 * random.standard_normal(int(smeared.sum()))
 
 
+def _with_tails(rows: pd.DataFrame, random: np.random.Generator) -> None:
+    """Make the errors of one measurement in twenty three times as large, in three exposures."""
+    for field, plate in ((0, 17), (1, 9), (3, 4)):
+        taken = (rows["field_id"] == field) & (rows["plate_id"] == plate)
+        wrong = rows.index[taken & (random.random(len(rows)) < 0.05)]
+        for axis in "xy":
+            scale = np.sqrt(3.0**2 - 1.0) * rows.loc[wrong, f"s{axis}"]
+            rows.loc[wrong, f"n{axis}"] += scale * random.standard_normal(len(wrong))
+
+
 def _mismatched(rows: pd.DataFrame, random: np.random.Generator) -> None:
     """Take a neighbour for the star in 15 measurements, and let a star move during the orbit."""
     wrong = random.choice(len(rows), 15, replace=False)
@@ -261,6 +271,7 @@ ORBITS: Mapping[str, Pair] = {
         lambda: _chosen(_fitted(_measured(_moved_detector)), detector=1),
     ),
     "pulls": (_good_chosen, lambda: _chosen(_fitted(_measured(_understated)))),
+    "residual-tails": (_good_chosen, lambda: _chosen(_fitted(_measured(_with_tails)))),
     "residual-correlation": (_good_chosen, lambda: _chosen(_fitted(_measured(_deforming)))),
     "largest-residuals": (_good_chosen, lambda: _chosen(_fitted(_measured(_mismatched)))),
     "deviation": (_good_chosen, lambda: _chosen(_overconfident_catalogue())),

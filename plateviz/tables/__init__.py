@@ -54,6 +54,7 @@ from plateviz.tables.residual_correlation import (
     correlation_statistics,
     residual_correlation,
 )
+from plateviz.tables.residual_tails import kurtosis_by_group, residual_tails
 from plateviz.tables.residuals import (
     ScatterStatistics,
     binned_vectors,
@@ -126,6 +127,7 @@ __all__ = [
     "footprint_fields",
     "footprint_sources",
     "julian_year",
+    "kurtosis_by_group",
     "largest_residuals",
     "loss_excess",
     "eigenmode_deciders",
@@ -158,6 +160,7 @@ __all__ = [
     "residual_correlation",
     "residual_map",
     "residual_scatter",
+    "residual_tails",
     "run_strip",
     "scatter_cells",
     "scatter_statistics",

@@ -30,6 +30,7 @@ def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, ins
     """Return name -> (draw, table): the plot as a function of the table."""
     residuals = tables.residual_map(fit_result, instrument, detector_id=0)
     fields = tables.footprint_fields(fit_result, instrument)
+    groups = tables.kurtosis_by_group(fit_result)
     detector = instrument.detectors[0]
     differences = tables.comparison(fit_result, make_fit_result(2)[0])
     return {
@@ -101,6 +102,10 @@ def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, ins
         "reference_influence": (
             plots.plot_reference_influence,
             tables.reference_influence(linear_fit),
+        ),
+        "residual_tails": (
+            lambda t, **o: plots.plot_residual_tails(t, groups.head(20 * len(t)), **o),
+            tables.residual_tails(fit_result),
         ),
         "largest_residuals": (plots.plot_largest_residuals, tables.largest_residuals(fit_result)),
     }

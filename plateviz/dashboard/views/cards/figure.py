@@ -127,12 +127,12 @@ class FigureView(pn.viewable.Viewer):
 
     def take_row(self) -> None:
         """Take a whole row of the grid."""
-        self._card.styles = {**self._card.styles, "grid-column": "1 / -1"}
+        self.take_columns("1 / -1", least_width=0)
 
-    def take_two_columns(self) -> None:
-        """Take two columns of the grid, where it has several."""
-        wide = "@media (width >= 1200px) { :host { grid-column: span 2; } }"
-        self._card.stylesheets = [*self._card.stylesheets, wide]
+    def take_columns(self, which: str = "span 2", *, least_width: int = 1200) -> None:
+        """Take columns of the grid in a window of at least this width; the last call counts."""
+        rule = f"@media (width >= {least_width}px) {{ :host {{ grid-column: {which}; }} }}"
+        self._card.stylesheets = [*self._card.stylesheets, rule]
 
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""

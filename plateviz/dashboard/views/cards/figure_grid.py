@@ -14,6 +14,8 @@ from plateviz.dashboard.views.cards.figure import FigureView, Part
 # Figures that are drawn for the first time at once; after each batch, Bokeh goes through all models
 # of the page.
 _BATCH = 3
+# Narrowest window with the columns of a large screen, pixels.
+_LARGE = 1536
 # Time in which the browser lays out a page that has been opened.
 _SETTLING_SECONDS = 10.0
 
@@ -38,7 +40,8 @@ class FigureGrid(pn.viewable.Viewer):
         ----------
         wake : called when a figure comes near the screen, leaves it, or gets another size
         columns : at most, where there is room
-        columns_if_wide : on a large screen; None for `columns`
+        columns_if_wide : on a large screen; None for `columns`. Of five cards, the last two wide,
+            three stand above two there
         first, others : cards before and after those of the figures
         """
         super().__init__(**params)
@@ -48,6 +51,10 @@ class FigureGrid(pn.viewable.Viewer):
         n_places = len(first) + len(self._views) + len(others)
         if columns == 2 and n_places % 2:
             next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
+        if columns == 2 and [v.is_wide for v in self._views] == 3 * [False] + 2 * [True]:
+            columns_if_wide = 6
+            for view in self._views:
+                view.take_columns("span 3" if view.is_wide else "span 2", least_width=_LARGE)
         self._box = pmui.FlexBox(
             *first,
             *self._views,

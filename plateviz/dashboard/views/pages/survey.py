@@ -153,7 +153,7 @@ class SurveyPage(pn.viewable.Viewer):
             if figure.takes_row:
                 view.take_row()
             elif columns > 2 and figure.is_wide:
-                view.take_two_columns()
+                view.take_columns()
         self._grids[one] = grid
         self._show_selected()
         if not is_first:
@@ -170,7 +170,7 @@ class SurveyPage(pn.viewable.Viewer):
         self._grids[SurveyWorkspace.COMPARE] = grid
         views[0].take_row()
         for view in views[1:]:
-            view.take_two_columns()
+            view.take_columns()
         self._show_selected()
         compare.follow(self._shown)
         return compare.unless_alone(workspace(grid))

@@ -31,7 +31,12 @@ from plateviz.tables.field_residuals import (
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.largest_residuals import largest_residuals
-from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
+from plateviz.tables.mean_residuals import (
+    MapStatistics,
+    detector_statistics,
+    map_statistics,
+    mean_residuals,
+)
 from plateviz.tables.motion_differences import motion_differences, shared_motions
 from plateviz.tables.motion_pulls import motion_pulls
 from plateviz.tables.orbit_counts import orbit_counts
@@ -114,6 +119,7 @@ __all__ = [
     "convergence",
     "correlation_statistics",
     "detector_shifts",
+    "detector_statistics",
     "deviation",
     "deviation_statistics",
     "difference_histogram",

@@ -80,7 +80,8 @@ class MapStatistics(NamedTuple):
     n : measurements
     bins : number of bins
     sigma_mpix, sigma_mas : mean of a typical bin by chance, in one axis
-    spread : rms of the means over what is expected by chance, both axes
+    spread, spread_scatter : rms of the means over what is expected by chance, both axes, and the
+        standard deviation of it
     largest : largest mean over its sigma, absolute value, of both axes
     limit : what the largest of so many exceeds in 1 % of maps by chance
     """
@@ -90,6 +91,7 @@ class MapStatistics(NamedTuple):
     sigma_mpix: float
     sigma_mas: float
     spread: float
+    spread_scatter: float
     largest: float
     limit: float
 
@@ -102,10 +104,41 @@ def map_statistics(table: pd.DataFrame) -> MapStatistics:
         bins=len(table),
         sigma_mpix=float(np.median(table[["sigma_x_mpix", "sigma_y_mpix"]])),
         sigma_mas=float(np.median(table[["sigma_x_mas", "sigma_y_mas"]])),
-        spread=float(np.sqrt(np.mean(pulls**2))),
-        largest=float(np.abs(pulls).max()),
-        limit=largest_by_chance(pulls.size),
+        **_against_chance(pulls),
     )
+
+
+def _against_chance(pulls: np.ndarray) -> dict[str, float]:
+    """Return the scatter of means over their sigmas, and the largest, against chance."""
+    return {
+        "spread": float(np.sqrt(np.mean(pulls**2))),
+        "spread_scatter": 1.0 / float(np.sqrt(2.0 * pulls.size)),
+        "largest": float(np.abs(pulls).max()),
+        "limit": largest_by_chance(pulls.size),
+    }
+
+
+def detector_statistics(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the summary of a table of `mean_residuals` by detector.
+
+    Returns
+    -------
+    A row per detector with bins, in their order: `detector_id`, `n` (measurements), `bins`, the
+    columns `spread`, `spread_scatter`, `largest` and `limit` of `MapStatistics`, of this detector
+    alone, and `is_beyond` (whether the largest exceeds the limit)
+    """
+    rows = [
+        {
+            "detector_id": detector_id,
+            "n": int(bins["n"].sum()),
+            "bins": len(bins),
+            **_against_chance(bins[["pull_x", "pull_y"]].to_numpy()),
+        }
+        for detector_id, bins in table.groupby("detector_id", sort=False)
+    ]
+    names = ["detector_id", "n", "bins", "spread", "spread_scatter", "largest", "limit"]
+    found = pd.DataFrame(rows, columns=names)
+    return found.assign(is_beyond=found["largest"] > found["limit"])
 
 
 def square_bins(

@@ -19,8 +19,13 @@ from plateviz.plots.elements.focal_plane import XLABEL, YLABEL, detector_outline
 from plateviz.plots.elements.style import PANEL_WIDTH
 from plateviz.plots.elements.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
-from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
-from plateviz.tables.rounded import rounded
+from plateviz.tables.mean_residuals import (
+    MapStatistics,
+    detector_statistics,
+    map_statistics,
+    mean_residuals,
+)
+from plateviz.tables.rounded import rounded, with_error
 from solver.data.instrument import Instrument
 from solver.data.plural import plural
 from solver.units import UM_PER_MM
@@ -29,6 +34,7 @@ _TITLE = "Mean residual over the focal plane"
 _MARGIN = 1.06
 # The colours end at this number of sigmas of a typical bin, of which chance leaves few beyond.
 _COLOUR_SIGMAS = 4.0
+_OF_DETECTOR = ["spread", "spread_scatter", "largest", "limit"]
 
 
 def plot_mean_residual_map(
@@ -49,9 +55,15 @@ def plot_mean_residual_map(
     low, high = np.min(corners, axis=(0, 1)), np.max(corners, axis=(0, 1))
     middle, half = 0.5 * (low + high), 0.5 * _MARGIN * float((high - low).max())
     limits = [(float(at - half), float(at + half)) for at in middle]
-    statistics = map_statistics(table)
+    statistics, detectors = map_statistics(table), detector_statistics(table)
+    of_detectors = detectors.set_index("detector_id")[_OF_DETECTOR].add_prefix("detector_")
+    table = table.join(of_detectors, on="detector_id")
     outlines = detector_outlines(instrument.detectors)
-    panels = [_panel(table, axis, statistics, outlines, limits, width) for axis in "xy"]
+    subtitles = {"x": _bins_in_words(statistics), "y": _chance_in_words(statistics, detectors)}
+    panels = [
+        _panel(table, axis, statistics, outlines, limits, subtitle, width)
+        for axis, subtitle in subtitles.items()
+    ]
     return side_by_side(panels, columns=2, linked="xy")
 
 
@@ -61,6 +73,7 @@ def _panel(
     statistics: MapStatistics,
     outlines: Glyphs,
     limits: list[Limits],
+    subtitle: str,
     width: int,
 ) -> Figure:
     reach = _COLOUR_SIGMAS * statistics.sigma_mpix
@@ -78,29 +91,46 @@ def _panel(
             ("over its σ", f"@{{pull_{axis}}}{{0.0}}"),
             ("measurements", "@{n}"),
             ("detector", "@{detector_id}"),
+            (
+                "its scatter over chance",
+                "@{detector_spread}{0.00} ± @{detector_spread_scatter}{0.00}",
+            ),
+            ("its largest bin", "@{detector_largest}{0.0} σ (1 %: @{detector_limit}{0.0} σ)"),
         ],
     )
     return framed(
         [bins, outlines],
         title=f"Mean residual in {axis}",
-        subtitle=_subtitle(table, axis, statistics),
+        subtitle=subtitle,
         x=Axis(XLABEL, limits[0]),
         y=Axis(YLABEL, limits[1]),
         width=width,
     )
 
 
-def _subtitle(table: pd.DataFrame, axis: str, statistics: MapStatistics) -> str:
-    if axis == "x":
-        return (
-            f"{statistics.n:,} {plural(statistics.n, 'measurement')} in "
-            f"{statistics.bins:,} {plural(statistics.bins, 'bin')}; by chance ± "
-            f"{rounded(statistics.sigma_mpix)} mpix = {angle_text(statistics.sigma_mas)} in a "
-            f"typical bin; colours to ± {_COLOUR_SIGMAS:g}σ"
-        )
+def _bins_in_words(statistics: MapStatistics) -> str:
     return (
-        f"x and y: scatter {statistics.spread:.2f} times that by chance; largest bin "
+        f"{statistics.n:,} {plural(statistics.n, 'measurement')} in "
+        f"{statistics.bins:,} {plural(statistics.bins, 'bin')}; by chance ± "
+        f"{rounded(statistics.sigma_mpix)} mpix = {angle_text(statistics.sigma_mas)} in a "
+        f"typical bin; colours to ± {_COLOUR_SIGMAS:g}σ"
+    )
+
+
+def _chance_in_words(statistics: MapStatistics, detectors: pd.DataFrame) -> str:
+    spread = with_error(statistics.spread, statistics.spread_scatter, 1)
+    whole = (
+        f"x and y: scatter {spread} times that by chance; largest bin "
         f"{statistics.largest:.1f}σ; chance exceeds {statistics.limit:.1f}σ in one of 100 maps"
+    )
+    if len(detectors) < 2:
+        return whole
+    row = detectors.loc[(detectors["largest"] / detectors["limit"]).idxmax()]
+    spread = with_error(float(row["spread"]), float(row["spread_scatter"]), 1)
+    return (
+        f"{whole}\n{detectors['is_beyond'].sum()} of {len(detectors)} detectors beyond their own "
+        f"limit; furthest {row['detector_id']}: scatter {spread}, largest bin "
+        f"{row['largest']:.1f}σ, limit {row['limit']:.1f}σ"
     )
 
 
@@ -115,7 +145,8 @@ DIAGNOSTICS = (
         _TITLE,
         "Measured minus predicted position in all exposures, its mean in square bins over the "
         "detectors, corrected for what the source positions absorb. Good: "
-        "no pattern, a scatter as expected by chance, and a largest bin below the stated limit. "
+        "no pattern, a scatter as expected by chance, and a largest bin below the stated limit, on "
+        "the whole and on each detector. "
         "Neighbouring bins of one colour mean distortion that the order does not describe; a "
         "single bin or column means a defect of the detector.",
         OrbitWorkspace.PATTERNS,

@@ -66,9 +66,35 @@ def test_map_states_what_chance_does(means, instrument):
     x, y = map(subtitle_of, plots.plot_mean_residual_map(table, instrument))
     assert f"± {found.sigma_mpix:.2g} mpix" in x
     assert f"{len(table)} bins" in x
-    assert f"scatter {found.spread:.2f} times" in y
+    spread = f"{found.spread:.2f} ± {found.spread_scatter:.2f}"
+    assert f"scatter {spread} times" in y
     assert "largest bin 7.0σ" in y
     assert f"chance exceeds {found.limit:.1f}σ in one of 100" in y
+
+
+def test_map_names_the_detector_that_is_furthest_from_chance(means, instrument):
+    table = means.assign(pull_x=0.5, pull_y=-0.5)
+    at = table.index[table["detector_id"] == 2][3]
+    table.loc[at, "pull_y"] = -7.04
+    row = tables.detector_statistics(table).query("detector_id == 2").iloc[0]
+    x, y = plots.plot_mean_residual_map(table, instrument)
+    words = (
+        f"1 of 4 detectors beyond their own limit; furthest 2: scatter {row['spread']:.1f} ± 0.1"
+    )
+    assert words in subtitle_of(y)
+    assert f"largest bin 7.0σ, limit {row['limit']:.1f}σ" in subtitle_of(y)
+    assert "detectors" not in subtitle_of(x)
+    columns = y["bins"].columns
+    for name in ("spread", "spread_scatter", "largest", "limit"):
+        on_it = columns["detector_id"] == 2
+        assert (columns[f"detector_{name}"][on_it] == row[name]).all()
+    assert columns["detector_largest"].max() == pytest.approx(7.04)
+
+
+def test_map_of_a_single_detector_says_nothing_of_detectors(means, instrument):
+    one = means[means["detector_id"] == 1].reset_index(drop=True)
+    _, y = plots.plot_mean_residual_map(one, instrument)
+    assert "detectors" not in subtitle_of(y)
 
 
 def test_each_field_has_a_panel_with_its_chi2(fit_result, instrument):

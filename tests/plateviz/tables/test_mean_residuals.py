@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from plateviz import tables
@@ -133,3 +134,57 @@ def test_summary_has_scatter_and_largest_bin_with_its_limit(result, instrument):
     # Bonferroni's limit is close to it.
     assert found.limit == pytest.approx(largest_by_chance(1, 0.01 / count), rel=1e-3)
     assert found.sigma_mas / found.sigma_mpix == pytest.approx(0.4244, rel=1e-3)
+
+
+def test_detectors_have_their_own_scatter_and_limit(result, instrument):
+    table = tables.mean_residuals(result, instrument).assign(pull_x=1.0, pull_y=1.0)
+    on_it = table["detector_id"] == 2
+    table.loc[table.index[on_it][1], "pull_x"] = 3.8
+    found = tables.detector_statistics(table).set_index("detector_id")
+    assert found.index.tolist() == [d.detector_id for d in instrument.detectors]
+    assert found["bins"].sum() == len(table)
+    assert found["n"].sum() == table["n"].sum()
+    count = 2 * int(on_it.sum())
+    assert found.loc[2, "bins"] == on_it.sum()
+    assert found.loc[2, "spread"] == pytest.approx(np.sqrt((count - 1.0 + 3.8**2) / count))
+    assert found.loc[2, "spread_scatter"] == pytest.approx(1.0 / np.sqrt(2.0 * count))
+    assert found["largest"].tolist() == [1.0, 1.0, 3.8, 1.0]
+    assert found.loc[2, "limit"] == largest_by_chance(count)
+    assert found["is_beyond"].tolist() == [False, False, True, False]
+    # Among the bins of all detectors it would be none.
+    assert not tables.map_statistics(table).largest > tables.map_statistics(table).limit
+
+
+def test_noise_on_each_detector_scatters_and_is_beyond_its_limit_as_stated(result, instrument):
+    fitted, random = with_fitted_sources(result), np.random.default_rng(5)
+    found = []
+    for _ in range(30):
+        noise = SIGMA_MPIX * random.standard_normal((len(fitted.residuals), 2))
+        left = with_field(fitted, left_by_sources(fitted, noise))
+        found.append(tables.detector_statistics(tables.mean_residuals(left, instrument)))
+    every = pd.concat(found)
+    # Nothing is fitted here but the sources, where the table counts on four parameters more.
+    share = 1.0 - 4.0 / (2.0 * every["bins"].groupby(every.index).first().sum())
+    z = (every["spread"] * np.sqrt(share) - 1.0) / every["spread_scatter"]
+    assert z.mean() == pytest.approx(0.0, abs=0.37)
+    assert z.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * len(z)))
+    assert every["is_beyond"].mean() < 0.01 + 4.0 * np.sqrt(0.01 / len(every))
+
+
+def test_displaced_bin_is_beyond_the_limit_of_its_detector_alone(result, instrument):
+    fitted, random = with_fitted_sources(result), np.random.default_rng(7)
+    table = tables.mean_residuals(fitted, instrument)
+    bins = table.index[table["detector_id"] == 1]
+    row = table.loc[bins[len(bins) // 2]]
+    at = focal_residuals(fitted, instrument).at
+    noise = SIGMA_MPIX * random.standard_normal((len(at), 2))
+    noise[in_bin(at, row), 0] += 8.0 * row["sigma_x_mpix"]
+    moved = with_field(fitted, left_by_sources(fitted, noise))
+    found = tables.detector_statistics(tables.mean_residuals(moved, instrument))
+    assert found.loc[found["is_beyond"], "detector_id"].tolist() == [1]
+
+
+def test_no_bins_have_no_detectors(result, instrument):
+    none = tables.detector_statistics(tables.mean_residuals(result, instrument).head(0))
+    assert none.empty
+    assert "limit" in none

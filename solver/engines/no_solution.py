@@ -12,6 +12,8 @@ from solver.problem.problem import Problem
 
 # A start within this share of the largest pixel coordinate is near enough.
 _NEAR = 0.5
+# Uncertainties of a hundredth of a good measurement, pixels; larger ones are not to blame.
+_TINY_PIX = 1e-4
 # Priors ten thousand times narrower.
 _TIGHTENED = 1e8
 
@@ -48,7 +50,7 @@ def likely_cause(problem: Problem, mode: Mode) -> LikelyCause:
             "the same in both files",
             is_misfit=True,
         )
-    if _tight_priors_hold_it(problem, mode):
+    if numbers.sigma_pix < _TINY_PIX and _tight_priors_hold_it(problem, mode):
         return LikelyCause(
             "outweighed-priors",
             "the measurements outweigh the priors so far that rounding hides these",

@@ -12,6 +12,16 @@ from solver.problem.problem import build_problem
 from tests.solver.small_orbit import make_orbit
 
 
+def test_open_priors_are_not_taken_for_small_uncertainties():
+    flat = dict.fromkeys(("focal_length", "detector_x", "detector_y", "distortion_x"), np.inf)
+    problem = build_problem(make_orbit().data, MINI_MOCK, FitSettings(prior_widths=flat))
+    at = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
+    mode = Mode(*at, None, FitStatus.SINGULAR, [], accumulate(problem, *at))
+    cause = likely_cause(problem, mode)
+    assert cause.name == "open-direction"
+    assert "sx, sy" not in cause.words
+
+
 def test_wrong_unit_of_the_focal_length_is_named():
     data = make_orbit().data
     data.exposures["focal_length"] *= 1e3

@@ -43,12 +43,18 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     strip = (item.state for item in run_strip(orbits, motions))
     by_tests, by_numbers = _state_by_tests(diagnosis, causes), _state_by_numbers(diagnosis, far)
     state = worst([by_tests, by_numbers, *strip])  # type: ignore[list-item]
-    titles = _titles(diagnosis, causes, tables)
+    without = _without_solution(orbits)
+    titles = [*_titles(diagnosis, causes, tables), *without]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
-    reasons = [*(cause.sentence() for cause in causes), *_tested(diagnosis, found, tables)]
-    reasons += [*_fitted(orbits), *_motions(motions)]
-    reasons += _smooth_errors(tables.zonal, found, causes)
+    reasons = [cause.sentence() for cause in causes]
+    if (orbits["status"] == FAILED).all() and len(orbits):
+        # Nothing is there to be tested.
+        reasons += _fitted(orbits)
+    else:
+        reasons += [*_tested(diagnosis, found, tables), *_fitted(orbits), *_motions(motions)]
+        reasons += _smooth_errors(tables.zonal, found, causes)
     faults = [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
+    faults += [f"{words[0].upper()}{words[1:]}." for words in without]
     notable = [*_failed(orbits), *_notable(diagnosis, far)]
     tests = _in_words(diagnosis, found)
     return Verdict(state, headline, reasons, notable, faults, causes, tests)
@@ -132,12 +138,29 @@ def _in_words(diagnosis: RunDiagnosis, found: Sequence[Test]) -> list[TestInWord
     ]
 
 
+def _without_solution(orbits: pd.DataFrame) -> list[str]:
+    """Return how many orbits have no solution, as a clause; nothing if all have one."""
+    count, total = int((orbits["status"] == FAILED).sum()), len(orbits)
+    if not count:
+        return []
+    of_all = f"{count:,} of {total:,} orbits {'has' if count == 1 else 'have'} no solution"
+    return ["no orbit has a solution" if count == total else of_all]
+
+
 def _failed(orbits: pd.DataFrame) -> list[str]:
+    """Return why orbits have no solution, a sentence for each reason, the most frequent first."""
     failed = orbits[orbits["status"] == FAILED]
-    return [
-        f"Orbit {number} has no solution: {reason.removeprefix(f'orbit {number}: ')}"
-        for number, reason in zip(failed["orbit_id"], failed["message"], strict=True)
-    ]
+    pairs = zip(failed["orbit_id"], failed["message"], strict=True)
+    reasons = pd.Series(
+        [message.removeprefix(f"orbit {number}: ") for number, message in pairs], dtype=object
+    )
+    numbers = failed["orbit_id"].reset_index(drop=True)
+    found = []
+    for reason in reasons.value_counts(sort=True).index:
+        alike = numbers[reasons == reason]
+        who, verb = _named(alike), "has" if len(alike) == 1 else "have"
+        found.append(f"{who[0].upper()}{who[1:]} {verb} no solution: {reason}")
+    return found
 
 
 def _named(orbits: pd.Series) -> str:

@@ -152,13 +152,18 @@ def table(trials: Sequence[Trial], folder: Path) -> str:
         bad = sum(verdict.state == "bad" for verdict in verdicts)
         names = [[cause.name for cause in verdict.causes] for verdict in verdicts]
         right = sum(bool(set(RIGHT.get(defect, ())) & set(one)) for one in names)
-        first = Counter(one[0] if one else "-" for one in names)
+        # Without a solution there is no cause, only a fault: that there is none.
+        first = Counter(
+            (*one, "no solution" if verdict.faults else "-")[0]
+            for one, verdict in zip(names, verdicts, strict=True)
+        )
         text = ", ".join(f"{name} {count}" for name, count in first.most_common())
         label = f"`{defect}`" if defect else "none"
-        mean = np.mean([shift(trial, folder) for trial in of_defect]) if defect else None
+        shifts = [shift(trial, folder) for trial in of_defect] if defect else []
+        known = [one for one in shifts if np.isfinite(one)]
         lines.append(
-            f"| {label} | {'-' if mean is None else f'{mean:.2g}'} | {len(verdicts)} | {seen} |"
-            f" {'-' if mean is None else right} | {bad} | {text} |"
+            f"| {label} | {f'{np.mean(known):.2g}' if known else '-'} | {len(verdicts)} | {seen} |"
+            f" {right if defect else '-'} | {bad} | {text} |"
         )
     return "\n".join(lines)
 
@@ -166,9 +171,10 @@ def table(trials: Sequence[Trial], folder: Path) -> str:
 def shift(trial: Trial, parent: Path) -> float:
     """Return by how much a defect moves mean positions: rms in one coordinate, mas.
 
-    Compared are the sources with many orbits that are no reference stars.
+    Compared are the sources with many orbits that are no reference stars; NaN if there are none.
     """
-    return float(np.sqrt(np.mean(moved(trial, parent).to_numpy() ** 2)))
+    found = moved(trial, parent).to_numpy()
+    return float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
 
 
 def moved(trial: Trial, parent: Path) -> pd.DataFrame:

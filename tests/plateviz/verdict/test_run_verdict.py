@@ -290,14 +290,35 @@ def test_verdict_is_plain_for_json(good):
     assert {"state", "headline", "causes", "tests", "reasons"} <= set(plain)
 
 
-def test_run_names_its_failed_orbits(survey):
-    verdict = run_verdict(survey.orbits, survey.motions, no_tests())
-    assert verdict.state == "bad"
-    failed = [sentence for sentence in verdict.notable if "has no solution" in sentence]
-    assert [sentence.split()[1] for sentence in failed] == ["11", "12"]
-    named = survey.orbits.assign(message="orbit 11: too few measurements")
+def test_run_names_its_failed_orbits_by_reason(survey):
+    reasons = {11: "orbit 11: too few measurements", 12: "orbit 12: a direction is open"}
+    named = survey.orbits.assign(message=survey.orbits["orbit_id"].map(reasons).fillna(""))
     verdict = run_verdict(named, survey.motions, no_tests())
-    assert "Orbit 11 has no solution: too few measurements" in verdict.notable
+    assert verdict.state == "bad"
+    assert f": 2 of {len(named)} orbits have no solution." in verdict.headline
+    failed = [sentence for sentence in verdict.notable if "has no solution" in sentence]
+    assert failed == [
+        "Orbit 11 has no solution: too few measurements",
+        "Orbit 12 has no solution: a direction is open",
+    ]
+    alike = named.assign(message=[f"orbit {n}: too few" for n in named["orbit_id"]])
+    verdict = run_verdict(alike, survey.motions, no_tests())
+    assert "Orbits 11, 12 have no solution: too few" in verdict.notable
+
+
+def test_run_without_a_solution_says_why_and_nothing_of_tests(survey):
+    orbits = survey.orbits.assign(status="failed")
+    swapped = "orbit {}: Measurements have each other's identification: ... (--robust)"
+    orbits["message"] = [swapped.format(n) for n in orbits["orbit_id"]]
+    verdict = run_verdict(orbits, survey.motions.head(0), no_tests())
+    assert verdict.headline.endswith("as it is: no orbit has a solution.")
+    assert verdict.faults == ["No orbit has a solution."]
+    assert verdict.reasons == ["No orbit has a solution."]
+    (why,) = verdict.notable
+    assert why.startswith(f"{len(orbits)} orbits, among them 0, 1, ")
+    assert why.endswith(
+        "have no solution: Measurements have each other's identification: ... (--robust)"
+    )
 
 
 @pytest.mark.parametrize(

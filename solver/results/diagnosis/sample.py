@@ -65,7 +65,7 @@ def sample_of(
         return Sample([some], camera, weight, 1.0)
     order = _along_the_sky(sources)
     order = order[counts[order] > 0]
-    taken = order[np.arange(0.0, len(order), step).astype(np.intp)]
+    taken = order[_at_steps(len(order), step)]
     parts = [_of_sources(some, half, len(sources)) for half in (taken[::2], taken[1::2])]
     exposures = [np.flatnonzero(np.diff(part.first)) for part in (some, *parts)]
     if not all(np.array_equal(exposures[0], of_part) for of_part in exposures[1:]):
@@ -118,6 +118,13 @@ def gauss_quadrature(
     basis, _ = np.linalg.qr(root[:, None] * legendre.legvander(within, count - 1))
     nodes, vectors = np.linalg.eigh(basis.T @ (within[:, None] * basis))
     return middle + half * nodes, float(weight.sum()) * vectors[0] ** 2
+
+
+def _at_steps(count: int, step: float) -> np.ndarray:
+    """Return whole numbers below `count` at equal steps, from zero."""
+    places = np.arange(0.0, count, step).astype(np.intp)
+    # By rounding, the last one may be the end itself.
+    return places[places < count]
 
 
 def _of_sources(rows: Rows, sources: np.ndarray, n_sources: int) -> Rows:

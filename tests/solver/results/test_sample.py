@@ -24,6 +24,14 @@ def test_sources_of_a_sample_are_spread_over_the_sky():
     assert chosen["is_reference"].mean() == pytest.approx(sources["is_reference"].mean(), abs=0.003)
 
 
+def test_sources_at_equal_steps_are_within_their_number():
+    """Rounding made one of 8,311 sources the one after the last."""
+    for count in range(1801, 9000):
+        places = sample._at_steps(count, count / 1800)
+        assert 1800 <= len(places) <= 1801
+        assert places[-1] < count
+
+
 @pytest.mark.parametrize("count", [1, 4, 7])
 def test_quadrature_is_exact_for_polynomials(count):
     random = np.random.default_rng(3)

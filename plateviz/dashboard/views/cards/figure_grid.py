@@ -51,7 +51,8 @@ class FigureGrid(pn.viewable.Viewer):
         n_places = len(first) + len(self._views) + len(others)
         if columns == 2 and n_places % 2:
             next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
-        if columns == 2 and [v.is_wide for v in self._views] == 3 * [False] + 2 * [True]:
+        are_wide = [view.is_wide for view in self._views]
+        if columns == 2 and n_places == 5 and are_wide == 3 * [False] + 2 * [True]:
             columns_if_wide = 6
             for view in self._views:
                 view.take_columns("span 3" if view.is_wide else "span 2", least_width=_LARGE)

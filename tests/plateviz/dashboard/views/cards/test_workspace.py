@@ -7,6 +7,7 @@ from plateviz.dashboard.views.cards.figure import FigureView
 from plateviz.dashboard.views.cards.figure_grid import FigureGrid
 from plateviz.dashboard.views.cards.workspace import below_lines, workspace
 from plateviz.plots.gallery import diagnostics
+from tests.plateviz.dashboard.card_places import takes_row
 
 
 @pytest.fixture
@@ -47,7 +48,19 @@ def test_first_wide_card_takes_a_row_of_a_grid_that_would_have_a_hole():
         for name in ("mean-residual-map", "solution-tests", "residual-map")
     )
     FigureGrid([second, wide], lambda *_: None)
-    assert "grid-column" not in wide.__panel__().styles
+    assert not takes_row(wide)
     FigureGrid([second, wide, third], lambda *_: None)
-    assert wide.__panel__().styles["grid-column"] == "1 / -1"
-    assert "grid-column" not in second.__panel__().styles
+    assert takes_row(wide)
+    assert not takes_row(second)
+
+
+def test_three_cards_stand_above_two_wide_ones_on_a_large_screen():
+    named = {one.name: one for one in diagnostics()}
+    names = ("residual-map", "residual-scatter", "pulls", "residual-tails", "largest-residuals")
+    views = [FigureView(named[name], lambda: None) for name in names]
+    grid = FigureGrid(views, lambda *_: None)
+    assert "repeat(6" in str(grid.__panel__().sx)
+    spans = ["span 3" if view.is_wide else "span 2" for view in views]
+    assert spans == 3 * ["span 2"] + 2 * ["span 3"]
+    for view, span in zip(views, spans, strict=True):
+        assert f"grid-column: {span}" in view.__panel__().stylesheets[-1]

@@ -5,6 +5,7 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards.workspace import below_lines
 from plateviz.dashboard.views.pages.survey import SurveyPage
 from plateviz.plots.workspace import SurveyWorkspace
+from tests.plateviz.dashboard.card_places import takes_row
 from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 
 
@@ -15,7 +16,7 @@ def test_figures_of_many_frames_have_a_row_each(fit_result, survey):
     navigation.turn_to(View.SURVEY)
     navigation.turn_to_workspace(SurveyWorkspace.ACCURACY)
     views = page.figures._views
-    rows = [one.card_name for one in views if "grid-column" in one.__panel__().styles]
+    rows = [one.card_name for one in views if takes_row(one)]
     assert rows == ["motion-pulls", "calibration-trends"]
     # The others fill rows of two.
     assert (len(views) - len(rows)) % 2 == 0

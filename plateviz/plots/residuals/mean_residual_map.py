@@ -95,7 +95,7 @@ def _panel(
                 "its scatter over chance",
                 "@{detector_spread}{0.00} ± @{detector_spread_scatter}{0.00}",
             ),
-            ("its largest bin", "@{detector_largest}{0.0} σ (1 %: @{detector_limit}{0.0} σ)"),
+            ("its largest bin", "@{detector_largest}{0.0} σ (≤ @{detector_limit}{0.0} σ)"),
         ],
     )
     return framed(
@@ -109,29 +109,30 @@ def _panel(
 
 
 def _bins_in_words(statistics: MapStatistics) -> str:
+    spread = with_error(statistics.spread, statistics.spread_scatter, 1)
     return (
         f"{statistics.n:,} {plural(statistics.n, 'measurement')} in "
-        f"{statistics.bins:,} {plural(statistics.bins, 'bin')}; by chance ± "
-        f"{rounded(statistics.sigma_mpix)} mpix = {angle_text(statistics.sigma_mas)} in a "
-        f"typical bin; colours to ± {_COLOUR_SIGMAS:g}σ"
+        f"{statistics.bins:,} {plural(statistics.bins, 'bin')}, ± "
+        f"{rounded(statistics.sigma_mpix)} mpix = {angle_text(statistics.sigma_mas)} by chance\n"
+        f"scatter {spread} times chance; colours to ± {_COLOUR_SIGMAS:g}σ"
     )
 
 
 def _chance_in_words(statistics: MapStatistics, detectors: pd.DataFrame) -> str:
-    spread = with_error(statistics.spread, statistics.spread_scatter, 1)
-    whole = (
-        f"x and y: scatter {spread} times that by chance; largest bin "
-        f"{statistics.largest:.1f}σ; chance exceeds {statistics.limit:.1f}σ in one of 100 maps"
-    )
+    whole = f"x and y: largest {_largest(statistics.largest, statistics.limit)}"
     if len(detectors) < 2:
         return whole
     row = detectors.loc[(detectors["largest"] / detectors["limit"]).idxmax()]
-    spread = with_error(float(row["spread"]), float(row["spread_scatter"]), 1)
+    beyond = int(detectors["is_beyond"].sum())
     return (
-        f"{whole}\n{detectors['is_beyond'].sum()} of {len(detectors)} detectors beyond their own "
-        f"limit; furthest {row['detector_id']}: scatter {spread}, largest bin "
-        f"{row['largest']:.1f}σ, limit {row['limit']:.1f}σ"
+        f"{whole}\n{beyond} of {len(detectors)} detectors beyond their limit; "
+        f"furthest {row['detector_id']}: {_largest(row['largest'], row['limit'])}"
     )
+
+
+def _largest(value: float, limit: float) -> str:
+    """Return the largest bin, and what chance exceeds in one of a hundred maps."""
+    return f"{value:.1f}σ (≤ {limit:.1f}σ)"
 
 
 def _plot(chosen: Chosen) -> Figure:

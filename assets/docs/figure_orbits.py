@@ -149,8 +149,8 @@ def _with_tails(rows: pd.DataFrame, random: np.random.Generator) -> None:
         taken = (rows["field_id"] == field) & (rows["plate_id"] == plate)
         wrong = rows.index[taken & (random.random(len(rows)) < 0.05)]
         for axis in "xy":
-            scale = np.sqrt(3.0**2 - 1.0) * rows.loc[wrong, f"s{axis}"]
-            rows.loc[wrong, f"n{axis}"] += scale * random.standard_normal(len(wrong))
+            added = np.sqrt(3.0**2 - 1.0) * random.standard_normal(len(wrong))
+            rows.loc[wrong, f"n{axis}"] += added * rows.loc[wrong, f"s{axis}"]
 
 
 def _mismatched(rows: pd.DataFrame, random: np.random.Generator) -> None:

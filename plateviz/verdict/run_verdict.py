@@ -47,7 +47,7 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     titles = [*_titles(diagnosis, causes, tables), *without]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     reasons = [cause.sentence() for cause in causes]
-    if (orbits["status"] == FAILED).all() and len(orbits):
+    if len(orbits) and (orbits["status"] == FAILED).all():
         # Nothing is there to be tested.
         reasons += _fitted(orbits)
     else:
@@ -151,14 +151,11 @@ def _failed(orbits: pd.DataFrame) -> list[str]:
     """Return why orbits have no solution, a sentence for each reason, the most frequent first."""
     failed = orbits[orbits["status"] == FAILED]
     pairs = zip(failed["orbit_id"], failed["message"], strict=True)
-    reasons = pd.Series(
-        [message.removeprefix(f"orbit {number}: ") for number, message in pairs], dtype=object
-    )
-    numbers = failed["orbit_id"].reset_index(drop=True)
+    reasons = [message.removeprefix(f"orbit {number}: ") for number, message in pairs]
+    alike = failed["orbit_id"].groupby(reasons, sort=False)
     found = []
-    for reason in reasons.value_counts(sort=True).index:
-        alike = numbers[reasons == reason]
-        who, verb = _named(alike), "has" if len(alike) == 1 else "have"
+    for reason, numbers in sorted(alike, key=lambda pair: -len(pair[1])):
+        who, verb = _named(numbers), "has" if len(numbers) == 1 else "have"
         found.append(f"{who[0].upper()}{who[1:]} {verb} no solution: {reason}")
     return found
 

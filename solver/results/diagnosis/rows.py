@@ -140,7 +140,7 @@ def _rows(table: SortedTable, columns: ResidualColumns, camera: Camera) -> Rows:
     um = camera.pitch.T.take(detector, axis=1).T
     first = np.searchsorted(table.exposure, np.arange(len(camera.time) + 1))
     left = 1.0 - np.clip(0.5 * table.column("leverage"), 0.0, 1.0)
-    # Each axis is contiguous: sums of the two are ten times as fast as along the second one.
+    # Each axis is contiguous: sums of the two are twice as fast as along the second one.
     square_x, square_y = np.square(columns.residual / columns.sigma).T
     is_far = _far(np.maximum(square_x, square_y), left, first)
     used = columns.residual * um

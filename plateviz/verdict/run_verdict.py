@@ -116,7 +116,9 @@ def _tested(diagnosis: RunDiagnosis, found: Sequence[Test], tables: RunTests) ->
             "made it."
         ]
     if not diagnosis.tests:
-        return ["A run with one solution has the tests of that orbit alone: they are in its verdict."]
+        return [
+            "A run with one solution has the tests of that orbit alone: they are in its verdict."
+        ]
     return [
         discoveries_in_words(diagnosis.tests, found, tests="tests of the run", good="good runs")
     ]

@@ -14,6 +14,7 @@ from solver.fit import fit_orbit
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.measure import measure_orbit
+from tests.campaigns import other_models
 from tests.campaigns.defects import SETTINGS, pulls
 from tests.campaigns.true_causes import all_deviations, deviations, true_terms
 
@@ -105,6 +106,17 @@ def test_detectors_that_move_between_fields_are_recovered():
     ):
         found = deviations(result, group, value * truth.ravel())
         assert np.abs(found).max() < 4.0, group
+
+
+@pytest.mark.parametrize("place", range(len(other_models.CASES)))
+def test_models_beyond_those_of_the_verdicts_campaign_are_recovered(place):
+    number, *_ = other_models.numbers_of(place, other_models.CASES[place])
+    record = other_models.trial(number)
+    assert record["converged"]
+    assert record["without"] > 1.3
+    # An error that all faint stars share makes the pulls of one orbit smaller or larger.
+    assert 0.5 < record["with"] < 1.5
+    assert record["deviation"] < 2.0
 
 
 def test_own_distortion_of_detectors_stands_for_a_higher_order():

@@ -23,13 +23,19 @@ def test_common_motions_are_what_no_star_can_show():
     at = np.array([266.0, -29.0]) + random.uniform(-0.5, 0.5, (50, 2))
     east, north = places_about(mean_direction(*at.T), *at.T).T
     columns = zonal_errors.common_motions(at)
+
+    def share_left(moved, count):
+        used, flat = columns[:, :count], np.stack(moved).ravel()
+        left = flat - used @ np.linalg.lstsq(used, flat)[0]
+        return np.sqrt(np.mean(left**2) / np.mean(flat**2))
+
     # A shift, a scale and a turn about another centre.
-    moved = np.stack([0.3 + 0.2 * east - 0.1 * north, -0.4 + 0.2 * north + 0.1 * east])
-    left = moved.ravel() - columns @ np.linalg.lstsq(columns, moved.ravel())[0]
-    assert np.abs(left).max() < 1e-12
-    stretched = np.stack([east, -north]).ravel()
-    left = stretched - columns @ np.linalg.lstsq(columns, stretched)[0]
-    assert np.sqrt(np.mean(left**2)) > 0.9 * np.sqrt(np.mean(stretched**2))
+    alike = 0.3 + 0.2 * east - 0.1 * north, -0.4 + 0.2 * north + 0.1 * east
+    assert share_left(alike, 4) < 1e-12
+    sheared = 0.2 * east + 0.1 * north, 0.1 * east - 0.2 * north
+    assert share_left(sheared, 4) > 0.9
+    assert share_left(sheared, 6) < 1e-12
+    assert share_left((east**2 - north**2, 2.0 * east * north), 6) > 0.5
 
 
 @pytest.mark.slow

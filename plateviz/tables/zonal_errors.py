@@ -50,7 +50,7 @@ class ZonalStatistics(NamedTuple):
 
     Attributes
     ----------
-    chi2, dof, scatter : of the directions tested, and its mean and standard deviation by chance
+    chi2, dof, scatter : of the test, and its mean and standard deviation by chance
     rms_mas : of the field along one axis, by the excess of chi2; 0 if there is none
     typical_mas : rms of a field that would be seen in half of all such runs
     """

@@ -218,5 +218,6 @@ def _smooth_errors(
     return [
         f"Smooth errors of the catalogue would be seen in half of such runs if their rms were "
         f"{rounded(zonal['typical'].iloc[0])} mas along each axis; smaller ones spoil the "
-        "positions unseen."
+        "positions unseen. So does what shifts, turns, stretches or shears the catalogue in the "
+        "whole area: pointing, focal length and detectors follow it."
     ]

@@ -124,8 +124,8 @@ ZONAL_FIELD = Table(
                 ("centre_dec", "deg", "Dec of the centre"),
                 ("half_ra", "deg", "half width of the area to the East"),
                 ("half_dec", "deg", "half width of the area to the North"),
-                ("chi2", "", "of the directions tested"),
-                ("dof", "", "number of these directions"),
+                ("chi2", "", "with the chance of the weighted sum of squares that is tested"),
+                ("dof", "", "degrees of freedom of this chi2"),
                 ("rms", "mas", "of the field along an axis, by the excess of chi2"),
                 ("typical", "mas", "rms of a field that is seen in half of such runs"),
             )

@@ -3,10 +3,10 @@
     python tests/campaigns/zonal_errors.py [--first 0] [--seeds 20] [--moved 0.1] [--folder zonal]
 
 Each seed has a field of its own. A first run, with a field of that rms, tells by how much it moves
-the mean positions. It is then scaled such that these move by `--moved`, in mas along each axis: as
-they are; without their common shift; and without their common shift, turn and scale. What stars
-have in common, no measurement of them can show. A stopped campaign goes on. For two processes, give
-each a part of the seeds.
+the mean positions. It is then scaled such that these move by `--moved`, in mas along each axis:
+without their common shift, turn and scale, which pointing and focal length take up; and without all
+that is linear, with the shears, which the places and pitches of the detectors take up. A stopped
+campaign goes on. For two processes, give each a part of the seeds.
 """
 
 import argparse
@@ -36,7 +36,7 @@ SETTINGS = replace(SurveySettings(orbits=ORBITS), magnitudes=True)
 CAUSE = "zonal-errors"
 FIRST_MAS = 0.1  # rms of the field of the first run
 # What is taken from the shifts before their rms is: the number of columns of `common_motions`.
-WITHOUT = {"nothing": 0, "the common shift": 2, "the common shift, turn and scale": 4}
+WITHOUT = {"the common shift, turn and scale": 4, "all that is linear": 6}
 
 
 def main() -> int:
@@ -84,11 +84,12 @@ def moved_by(trial: Trial, parent: Path, common: int) -> float:
     return float(np.sqrt(np.mean(left**2)))
 
 
-def common_motions(at: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2n 4"]:
-    """Return the shifts to East and North, first all to the East, the scale and the turn."""
+def common_motions(at: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2n 6"]:
+    """Return shifts to East and North, scale, turn and two shears, all to the East first."""
     east, north = places_about(mean_direction(*at.T), *at.T).T
     one, zero = np.ones(len(at)), np.zeros(len(at))
     parts = [(one, zero), (zero, one), (east, north), (-north, east)]
+    parts += [(east, -north), (north, east)]
     return np.stack([np.concatenate(part) for part in parts], axis=1)
 
 
@@ -103,7 +104,7 @@ def table(runs: Mapping[str, Sequence[Trial]], parent: Path) -> str:
         "\n| mean positions moved by (mas) | without | field (mas) | runs | χ² | seen | named |",
         "|---:|---|---:|---:|---:|---:|---:|",
     ]
-    clean = [Trial(CLEAN, trial.seed) for trial in runs["nothing"]]
+    clean = [Trial(CLEAN, trial.seed) for trial in next(iter(runs.values()))]
     for name, trials in {"(no field)": clean, **runs}.items():
         verdicts = [judge(trial, parent) for trial in trials]
         seen = sum(verdict.state != "good" for verdict in verdicts)

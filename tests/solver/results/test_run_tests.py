@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import chdtri
 
 from solver.data.run_schema import FIELD_DEGREES, FRAME_DEGREES
 from solver.model.apparent_motion import motion_design
@@ -12,6 +13,7 @@ from solver.results.diagnosis.survey.calibrations import orbit_calibration
 from solver.results.diagnosis.survey.frames import compare_frames
 from solver.results.diagnosis.survey.sky_orbit import SkyOrbit, shifted_monomials
 from solver.results.diagnosis.survey.trends import all_series, trend_tests
+from solver.results.diagnosis.survey.weighted_squares import WeightedSquares
 from solver.results.diagnosis.survey.zonal import zonal_field, zonal_test
 
 CENTRE, EPOCHS = (266.0, -29.0), np.linspace(61_800.0, 62_700.0, 9)
@@ -119,6 +121,18 @@ def frames():
 
 def zonal_of(frames, field, seed=5):
     return zonal_test(sky_orbits(field, seed, len(EPOCHS)), frames, AREA)
+
+
+@pytest.mark.parametrize("weights", [[1.0] * 6, [0.9, 0.8, 0.5, 0.3, 0.2, 0.1], [1.0, 0.1]])
+def test_weighted_squares_have_the_chance_of_their_chi2(weights):
+    weights = np.array(weights)
+    found = WeightedSquares.of(weights)
+    totals = np.random.default_rng(8).standard_normal((1_000_000, len(weights))) ** 2 @ weights
+    for chance in (0.1, 1e-2, 1e-3):
+        limit = found.total(float(chdtri(found.dof, chance)))
+        assert found.chi2(limit) == pytest.approx(chdtri(found.dof, chance), rel=1e-12)
+        # A thousand of a million are uncertain by 3 per cent.
+        assert np.mean(totals > limit) == pytest.approx(chance, rel=0.15)
 
 
 def test_catalogue_without_smooth_errors_is_within_chance(frames):

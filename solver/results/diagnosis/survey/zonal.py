@@ -4,7 +4,7 @@ The unknown field is a polynomial on the sky, about which smooth random fields s
 coefficient should be against the others. Its effect is told from what is fixed to the focal plane:
 quadratic terms of the distortion, the same in all orbits but for a linear trend. What is left of
 the statistics of all orbits is noise, and errors of single reference stars that the orbits share.
-The directions of the field that the orbits would show best are tested; there are few of them.
+Each direction of the field counts in the test as much as the orbits would show it.
 """
 
 from collections.abc import Sequence
@@ -14,22 +14,26 @@ import numpy as np
 import pandas as pd
 import scipy.linalg as sl
 from jaxtyping import Float, Int
+from scipy.optimize import brentq
 from scipy.special import chdtri, j0
 
 from solver.data.run_schema import FIELD_DEGREES, ZONAL_FIELD
 from solver.results.diagnosis.rate import log_chance, sigmas
 from solver.results.diagnosis.survey.frames import Frames
 from solver.results.diagnosis.survey.sky_orbit import N_FIELDS, N_FRAME, SkyOrbit
+from solver.results.diagnosis.survey.weighted_squares import WeightedSquares
 
 # With fewer orbits, a season has too few.
 LEAST_ORBITS = 8
 # Wavelengths of the expected fields, deg.
 _WAVELENGTHS_DEG = np.linspace(1.5, 3.0, 16)
-# Directions with less of the information than this share of the best are not tested.
-_LEAST_SHARE = 0.1
+# Directions with less of the information than this share of the best hold rounding errors.
+_LEAST_SHARE = 1e-6
 _GRID = 15
 # Chance of a field that counts as seen, among the tests of a run.
 _SEEN = 4e-4
+# Range of the typical size of a field, times the best information, in which it is looked for.
+_SIZES = 1e-12, 1e12
 # Relative to its diagonal, added to a covariance that is singular but for rounding.
 _RIDGE = 1e-6
 
@@ -39,7 +43,7 @@ class Zonal(NamedTuple):
 
     Attributes
     ----------
-    chi2, dof : of the directions tested
+    chi2, dof : a chi2 with the chance of the weighted sum of squares that is tested
     log_chance, sigma : of a chi2 as large by chance
     rms_mas : of the field where the orbits show it, along one axis; 0 if chance would do
     typical_mas : rms that would be seen in half of all such runs
@@ -49,7 +53,7 @@ class Zonal(NamedTuple):
     """
 
     chi2: float
-    dof: int
+    dof: float
     log_chance: float
     sigma: float
     rms_mas: float
@@ -84,19 +88,23 @@ def zonal_test(
     )
     root = np.linalg.cholesky(_expected(half_width) + _RIDGE * np.eye(N_FIELDS))
     information, vectors = np.linalg.eigh(root.T @ by_field.T @ by_field @ root)
-    tested = information > _LEAST_SHARE * information[-1]
-    information, directions = information[tested], root @ vectors[:, tested]
+    known = information > _LEAST_SHARE * information[-1]
+    information, directions = information[known], root @ vectors[:, known]
     deviates = directions.T @ (by_field.T @ values) / np.sqrt(information)
-    chi2, dof = float(deviates @ deviates), int(tested.sum())
-    chance = log_chance(chi2, float(dof))
-    square = max((chi2 - dof) / float(information.sum()), 0.0)
-    typical = _half_seen(dof) / _median(information)
+    # The deviates have the variance 1 + size information, so that these weights tell best a field
+    # of this size from none. It is the one that is seen in half of the runs.
+    typical = _typical_size(information)
+    weights = typical * information / (1.0 + typical * information)
+    total, squares = float(weights @ deviates**2), WeightedSquares.of(weights)
+    chi2 = squares.chi2(total)
+    chance = log_chance(chi2, squares.dof)
+    square = max((total - float(weights.sum())) / float(weights @ information), 0.0)
     # The most likely field, if one of this size, or one that could just be seen, is expected.
     size = max(square, typical)
     shrunk = size * np.sqrt(information) / (1.0 + size * information)
     return Zonal(
         chi2,
-        dof,
+        squares.dof,
         chance,
         sigmas(chance),
         float(np.sqrt(square)),
@@ -105,6 +113,23 @@ def zonal_test(
         directions * shrunk,
         half_width,
     )
+
+
+def _typical_size(information: Float[np.ndarray, " direction"]) -> float:
+    """Return the mean square of the fields of which half are seen with the best weights for it."""
+
+    def excess(log_size: float) -> float:
+        shares = np.exp(log_size) * information
+        weights = shares / (1.0 + shares)
+        of_none, of_field = (
+            WeightedSquares.of(weights),
+            WeightedSquares.of(weights * (1.0 + shares)),
+        )
+        seen = of_none.total(float(chdtri(of_none.dof, _SEEN)))
+        return of_field.total(float(chdtri(of_field.dof, 0.5))) - seen
+
+    low, high = (float(np.log(one / information.max())) for one in _SIZES)
+    return float(np.exp(brentq(excess, low, high)))
 
 
 def _whitened(orbits: Sequence[SkyOrbit], frames: Frames) -> _System:
@@ -163,22 +188,6 @@ def _expected(half_width: Float[np.ndarray, " 2"]) -> Float[np.ndarray, "field f
     return np.kron(np.eye(2), fitted @ alike @ fitted.T)
 
 
-def _half_seen(dof: int) -> float:
-    """Return by how much chi2 has to exceed its expectation to be seen."""
-    return float(chdtri(dof, _SEEN)) - dof
-
-
-def _median(information: Float[np.ndarray, " direction"]) -> float:
-    """Return the median over random fields of unit rms of what they add to chi2.
-
-    It is a sum of squares of normal deviates with these weights, taken for a multiple of a chi2,
-    whose median is that of Wilson and Hilferty.
-    """
-    total = float(information.sum())
-    dof = total**2 / float(np.sum(information**2))
-    return total * (1.0 - 2.0 / (9.0 * dof)) ** 3
-
-
 def zonal_field(found: Zonal, centre: tuple[float, float]) -> pd.DataFrame:
     """Return `run_schema.ZONAL_FIELD` of a test.
 
@@ -198,6 +207,6 @@ def zonal_field(found: Zonal, centre: tuple[float, float]) -> pd.DataFrame:
     columns |= {f"scatter_{number:02d}": column for number, column in enumerate(scatter.T)}
     columns |= {"centre_ra": centre[0], "centre_dec": centre[1]}
     columns |= {"half_ra": found.half_width[0], "half_dec": found.half_width[1]}
-    columns |= {"chi2": found.chi2, "dof": float(found.dof)}
+    columns |= {"chi2": found.chi2, "dof": found.dof}
     columns |= {"rms": found.rms_mas, "typical": found.typical_mas}
     return pd.DataFrame(columns)[ZONAL_FIELD.names]

@@ -218,6 +218,7 @@ def _smooth_errors(
     return [
         f"Smooth errors of the catalogue would be seen in half of such runs if their rms were "
         f"{rounded(zonal['typical'].iloc[0])} mas along each axis; smaller ones spoil the "
-        "positions unseen. So does what shifts, turns, stretches or shears the catalogue in the "
-        "whole area: pointing, focal length and detectors follow it."
+        "positions unseen. No orbit shows a shift, a turn or a change of scale of the whole "
+        "catalogue, whatever its size, nor most of a shear: pointing, focal length and detectors "
+        "follow it."
     ]

@@ -29,7 +29,7 @@ from solver.data.orbit import OrbitData
 from solver.errors import FitError, InputError
 from solver.fit import fit_orbit
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
-from solver.simulate.defects.defect import Defect
+from solver.simulate.defects.defect import AppliedDefect, Defect
 from solver.simulate.defects.stages import defective_catalogue
 from solver.simulate.defects.table import BY_NAME, DEFECTS
 from solver.simulate.defects.text import format_defect, parse_defects
@@ -142,6 +142,16 @@ def pulls(sources: pd.DataFrame, true_places: pd.DataFrame | None) -> np.ndarray
     ra = MAS_PER_DEG * (rows["ra"] - rows["ra_true"]) * stretch / rows["sigma_ra_marginal"]
     dec = MAS_PER_DEG * (rows["dec"] - rows["dec_true"]) / rows["sigma_dec_marginal"]
     return np.stack([ra, dec], axis=1)
+
+
+def rms(values: np.ndarray) -> float:
+    """Return the root of the mean square, as it is recorded."""
+    return round(float(np.sqrt(np.mean(np.square(values)))), 4)
+
+
+def applied_defect(name: str, amplitude: float, seed: int) -> AppliedDefect:
+    """Return a defect of such an orbit, with the amplitude in the unit of its table."""
+    return AppliedDefect(name, amplitude, replace(SETTINGS, seed=seed), seed % SETTINGS.orbits)
 
 
 def report(number: int, record: Record) -> None:

@@ -35,7 +35,7 @@ from solver.simulate.settings import SurveySettings
 from solver.units import MAS_PER_DEG
 from tests.benchmarks.machine import write
 from tests.benchmarks.orbits import ORBIT, SOURCES_OF_THE_PAPER, survey_of
-from tests.campaigns.defects import SETTINGS, defective_orbit, pulls
+from tests.campaigns.defects import SETTINGS, defective_orbit, pulls, rms
 from tests.campaigns.trials import Record, run_trials
 
 PERCENT = (0.2, 1.0)
@@ -179,11 +179,6 @@ def shifts(sources: pd.DataFrame, without: pd.DataFrame) -> np.ndarray:
     ra = MAS_PER_DEG * (both["ra"] - both["ra_without"]) * stretch / both["sigma_ra_marginal"]
     dec = MAS_PER_DEG * (both["dec"] - both["dec_without"]) / both["sigma_dec_marginal"]
     return np.stack([ra, dec], axis=1)
-
-
-def rms(values: np.ndarray) -> float:
-    """Return the root mean square."""
-    return round(float(np.sqrt(np.mean(values**2))), 4)
 
 
 def report(number: int, record: Record) -> None:

@@ -32,11 +32,17 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.fit import fit_orbit
 from solver.results.diagnosis.patterns import legendre_at
-from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.defects.distortion_terms import ORBITAL_PERIOD_S
 from solver.units import PIX_PER_MPIX, SECONDS_PER_DAY
 from tests.benchmarks.machine import write
-from tests.campaigns.defects import SETTINGS, defective_orbit, pulls, sparse_orbit
+from tests.campaigns.defects import (
+    SETTINGS,
+    applied_defect,
+    defective_orbit,
+    pulls,
+    rms,
+    sparse_orbit,
+)
 from tests.campaigns.trials import Record, run_trials
 from tests.campaigns.true_causes import deviations, truth_of
 
@@ -107,11 +113,6 @@ def trial(number: int) -> Record:
     }
 
 
-def rms(values: np.ndarray) -> float:
-    """Return the root of the mean square."""
-    return round(float(np.sqrt(np.mean(np.square(values)))), 4)
-
-
 def row(case: Case, records: Sequence[Record]) -> str:
     """Return the line of the table for a case."""
     without, with_, deviation = (
@@ -143,7 +144,7 @@ def oscillating(seed: int) -> OrbitData:
 
 def walk_of_drift(result: FitResult, seed: int) -> np.ndarray:
     """Return the deviations of the walk from the drift."""
-    truth = truth_of(applied("distortion-drift", DRIFT_UM, seed), result.exposures)
+    truth = truth_of(applied_defect("distortion-drift", DRIFT_UM, seed), result.exposures)
     return walk_deviations(
         result, [truth[f"drift_{axis}"] for axis in "xy"], np.array([in_time(result)])
     )
@@ -151,7 +152,7 @@ def walk_of_drift(result: FitResult, seed: int) -> np.ndarray:
 
 def walk_of_oscillation(result: FitResult, seed: int) -> np.ndarray:
     """Return the deviations of the walk from the oscillation."""
-    truth = truth_of(applied("distortion-orbital", ORBITAL_UM, seed), result.exposures)
+    truth = truth_of(applied_defect("distortion-orbital", ORBITAL_UM, seed), result.exposures)
     half = 0.5 * SECONDS_PER_DAY * float(np.ptp(result.exposures["obstime"]))
     phase = 2.0 * np.pi * half / ORBITAL_PERIOD_S * in_time(result)
     waves = np.array([np.cos(phase), np.sin(phase)])
@@ -186,18 +187,13 @@ def walk_deviations(
 
 def cubic_drift(result: FitResult, seed: int) -> np.ndarray:
     """Return the deviations of a cubic drift from the linear one: its other terms are zero."""
-    truth = truth_of(applied("distortion-drift", DRIFT_UM, seed), result.exposures)
+    truth = truth_of(applied_defect("distortion-drift", DRIFT_UM, seed), result.exposures)
     slopes = {group: np.atleast_1d(slope) for group, slope in truth.items()}
     found = [
         deviations(result, group, np.concatenate([slope, np.zeros(2 * len(slope))]))
         for group, slope in slopes.items()
     ]
     return np.concatenate(found)
-
-
-def applied(name: str, amplitude: float, seed: int) -> AppliedDefect:
-    """Return a defect as it is put into an orbit, with the amplitude in the unit of its table."""
-    return AppliedDefect(name, amplitude, replace(SETTINGS, seed=seed), seed % SETTINGS.orbits)
 
 
 def shifted_by_magnitude(seed: int) -> OrbitData:

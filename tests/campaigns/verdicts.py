@@ -15,7 +15,6 @@ for those of cases of which a trial has another verdict now.
 import argparse
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 # Import this checkout, whatever the working directory.
@@ -31,10 +30,9 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import FitError, InputError
 from solver.fit import fit_orbit
-from solver.simulate.defects.defect import AppliedDefect
 from tests.benchmarks.machine import write
 from tests.campaigns.carried import carry_over
-from tests.campaigns.defects import SETTINGS, pulls
+from tests.campaigns.defects import applied_defect, pulls
 from tests.campaigns.trials import Record, read_records, run_trials
 from tests.campaigns.true_causes import all_deviations
 from tests.campaigns.verdict_cases import Trial, numbers, trial_of
@@ -106,9 +104,7 @@ def of_truth(wanted: Trial, result: FitResult) -> dict[str, float | int]:
     case = wanted.case
     if case is None:
         return {}
-    of_survey = replace(SETTINGS, seed=wanted.orbit)
-    orbit_id = wanted.orbit % SETTINGS.orbits
-    defect = AppliedDefect(case.name, wanted.factor * case.amplitude, of_survey, orbit_id)
+    defect = applied_defect(case.name, case.at(wanted.factor), wanted.orbit)
     found = all_deviations(defect, result)
     if not found:
         return {}

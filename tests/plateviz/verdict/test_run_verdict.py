@@ -64,6 +64,7 @@ def test_smooth_errors_beside_a_more_certain_cause_are_not_passed_over(good):
     assert "may have smooth errors as well, of about 0.4 mas" in sentence
     (sentence,) = (one for one in judged(good, **drifting).reasons if "Smooth errors" in one)
     assert "would be seen in half" in sentence
+    assert "No orbit shows a shift" in sentence
 
 
 def test_cause_that_many_orbits_name_is_that_of_the_run(good):

@@ -207,24 +207,31 @@ def gather(run: RunDirectory) -> None:
     if run.is_complete or not complete or run.gathered_orbits() == complete:
         return
     run.begin_gathering()
-    _write_tables(run)
+    history = gather_history(run)
     write_test_tables(run)
+    _write_motions(run, history)
     run.mark_gathered(complete)
 
 
-def _write_tables(run: RunDirectory) -> None:
-    history = parquet.ParquetFile(gather_history(run))
+def _write_motions(run: RunDirectory, path: Path) -> None:
+    """Write the motions, last of all: a run with motions is read, and judged, as gathered.
+
+    Parameters
+    ----------
+    path : of the gathered history
+    """
+    history = parquet.ParquetFile(path)
     epochs = np.unique(_column(history, "epoch"))
     epoch = float(julian_year(epochs).mean())
     motions, artificial = [], []
     for rows in _whole_sources(history):
         motions.append(motion_table(rows, epoch))
         artificial.append(rows[rows["is_artificial"] & rows["true_offset_ra"].notna()])
-    _write(run.directory / MOTIONS_FILE, pd.concat(motions)[MOTIONS.names])
     averaged = pd.concat(artificial, ignore_index=True)
     most = int(averaged.groupby("source_id").size().max()) if len(averaged) else 0
     errors = errors_by_count(averaged, list(range(1, most + 1)))
     _write(run.directory / ERRORS_FILE, errors[ERRORS_BY_COUNT.names])
+    _write(run.directory / MOTIONS_FILE, pd.concat(motions)[MOTIONS.names])
 
 
 def _whole_sources(history: parquet.ParquetFile) -> Iterator[pd.DataFrame]:

@@ -42,9 +42,11 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     far = _far_off(orbits)
     strip = (item.state for item in run_strip(orbits, motions))
     by_tests, by_numbers = _state_by_tests(diagnosis, causes), _state_by_numbers(diagnosis, far)
+    untested = _untested(tables)
     state = worst([by_tests, by_numbers, *strip])  # type: ignore[list-item]
+    state = worst([state, "warn"]) if untested else state
     without = _without_solution(orbits)
-    titles = [*_titles(diagnosis, causes, tables), *without]
+    titles = [*_titles(diagnosis, causes, tables), *without, *untested]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     reasons = [cause.sentence() for cause in causes]
     if len(orbits) and (orbits["status"] == FAILED).all():
@@ -109,8 +111,13 @@ def _notable(diagnosis: RunDiagnosis, far: pd.Series) -> list[str]:
     ]
 
 
+def _untested(tables: RunTests) -> list[str]:
+    """Return that a run has no tests, as a clause; nothing if it has."""
+    return ["it has not been tested as a whole"] if tables.orbit_causes.empty else []
+
+
 def _tested(diagnosis: RunDiagnosis, found: Sequence[Test], tables: RunTests) -> list[str]:
-    if tables.orbit_causes.empty:
+    if _untested(tables):
         return [
             "The run has not been tested as a whole: it is not gathered yet, or an older version "
             "made it."

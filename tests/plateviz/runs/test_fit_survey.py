@@ -14,7 +14,9 @@ from distributed import LocalCluster
 
 from plateviz.cli.paper_survey import reproduced
 from plateviz.cli.survey import parse_orbits
-from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs import fit_survey as fit_survey_module
+from plateviz.runs.fit_survey import fit_survey, gather
+from plateviz.runs.gathered_diagnosis import write_test_tables
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import Run, open_run, survey_runs
 from plateviz.runs.run_directory import RunDirectory
@@ -143,6 +145,30 @@ def test_run_killed_before_gathering_is_completed(report, fitted_survey):
     assert fit_survey(fitted_survey, "late", SETTINGS).fitted == []
     assert late.is_complete
     assert contents(late) == contents(report.run)
+
+
+def test_run_without_all_of_its_test_tables_is_not_judged_as_gathered(
+    report, fitted_survey, monkeypatch
+):
+    directory = shutil.copytree(report.run.directory, fitted_survey / "runs" / "gathering")
+    partial = RunDirectory(fitted_survey, "gathering")
+    kept = {table.name: directory / f"{table.name}.parquet" for table in RUN_TABLES}
+    for name in ("COMPLETE", "gathered.json", "motions.parquet"):
+        (directory / name).unlink()
+    for file in kept.values():
+        file.unlink()
+    seen = []
+
+    def write_tables(run):
+        write_test_tables(run)
+        seen.append((run.is_gathered, read_run_verdict(Run(run)).state))
+
+    monkeypatch.setattr(fit_survey_module, "write_test_tables", write_tables)
+    gather(partial)
+    assert seen == [(False, "warn")]
+    assert partial.is_gathered
+    assert all(file.is_file() for file in kept.values())
+    shutil.rmtree(directory)
 
 
 def test_orbits_table_follows_the_schema(run):

@@ -282,6 +282,8 @@ def test_good_orbits_together_are_within_chance(good, seed):
 def test_run_that_was_not_tested_says_so(good):
     verdict = run_verdict(*good, no_tests())
     assert any("not been tested as a whole" in sentence for sentence in verdict.reasons)
+    assert verdict.state == "warn"
+    assert verdict.headline.endswith("it has not been tested as a whole.")
     assert any("not looked for" in sentence for sentence in verdict.reasons)
 
 

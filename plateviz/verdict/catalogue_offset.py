@@ -97,15 +97,23 @@ class CatalogueOffset(NamedTuple):
 def catalogue_offset(result: FitResult) -> CatalogueOffset | None:
     """Return the offset if it is none by accident; single stars that are far off make none."""
     sources = result.sources
-    others = sources[~sources["is_reference"].to_numpy(dtype=bool)]
-    if len(others) < _LEAST or len(others) == len(sources):
+    is_other = ~sources["is_reference"].to_numpy(dtype=bool)
+    count = int(is_other.sum())
+    if count < _LEAST or count == len(sources):
         return None
-    distances = others[[f"offset_{axis}" for axis in _AXES]].to_numpy(dtype=float)
-    median = np.median(distances, axis=0)
-    spread = _SIGMA_OF_DISTANCE * np.median(np.abs(distances - median), axis=0)
+    distances, stated = (
+        [sources[f"{name}_{axis}"].to_numpy(dtype=float)[is_other] for axis in _AXES]
+        for name in ("offset", "prior_sigma")
+    )
+    median = [float(np.median(along)) for along in distances]
+    spread = [
+        _SIGMA_OF_DISTANCE * float(np.median(np.abs(along - middle)))
+        for along, middle in zip(distances, median, strict=True)
+    ]
     # The reference stars let all others have an error in common.
     shared = [float(result.summary[f"mean_error_{axis}"]) for axis in _AXES]
-    expected = np.hypot(_SIGMA_OF_MEDIAN * spread / np.sqrt(len(others)), shared)
-    stated = np.median(others[[f"prior_sigma_{axis}" for axis in _AXES]].to_numpy(dtype=float))
-    found = CatalogueOffset(len(others), tuple(median), tuple(expected), float(stated))
+    expected = np.hypot(_SIGMA_OF_MEDIAN * np.array(spread) / np.sqrt(count), shared)
+    found = CatalogueOffset(
+        count, (median[0], median[1]), (expected[0], expected[1]), float(np.median(stated))
+    )
     return found if found.log_chance < _LOG_CHANCE else None

@@ -112,6 +112,6 @@ def _cause(result: FitResult, groups: list[_Group]) -> Cause:
 
 def _on_sky(result: FitResult, pixels: float) -> float:
     """Return the size of a displacement in pixels, mas."""
-    pitch = float(result.values_on("det")["pitch_x"].mean())
-    focal_length = float(result.values_on("exp")["focal_length"].mean())
+    pitch = float(result.values_of("pitch_x").mean())
+    focal_length = float(result.values_of("focal_length").mean())
     return pixels * pitch / (focal_length * RAD_PER_MAS)

@@ -39,7 +39,10 @@ def _far_exposures(result: FitResult) -> list[str]:
 
 def _far_sources(result: FitResult) -> list[str]:
     dof, chi2 = (result.sources[name].to_numpy(dtype=float) for name in ("dof", "chi2"))
-    above = np.where(dof > 0.0, chdtrc(dof, chi2), np.nan)
+    # Of the others, so many good ones are larger that none is far.
+    above = np.ones(len(dof))
+    might = (dof > 0.0) & (chi2 > dof + 2.0 * np.sqrt(2.0 * dof))
+    above[might] = chdtrc(dof[might], chi2[might])
     is_far = above < _BY_CHANCE / max(np.count_nonzero(dof > 0.0), 1)
     if not is_far.any():
         return []

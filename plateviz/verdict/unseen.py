@@ -94,10 +94,12 @@ def quadratic_mas(result: FitResult) -> float:
 
     A common shift is left out, which the pointing takes up.
     """
-    terms = result.values_on("coef", "offset").head(3)
     scale = float(result.summary.get("distortion_scale_um", np.nan))
-    if len(terms) < 3 or not scale > 0.0:
+    if "distortion_x" not in result.group_rows or not scale > 0.0:
         return float("nan")
+    coefficients = np.stack(
+        [result.values_of(f"distortion_{axis}", "offset")[:3] for axis in "xy"], axis=1
+    )
     # Every so many measurements: the places on the focal plane are known well enough from these.
     stride = -(-len(result.residuals) // _MOST_PLACES)
     x, y = (
@@ -105,9 +107,8 @@ def quadratic_mas(result: FitResult) -> float:
         for axis in "xy"
     )
     covariance = np.cov(np.stack([1.5 * x * x, x * y, 1.5 * y * y]), bias=True)
-    coefficients = terms[["distortion_x", "distortion_y"]].to_numpy()
     variance = float(np.sum(coefficients * (covariance @ coefficients)))
-    focal_length = float(result.values_on("exp")["focal_length"].mean())
+    focal_length = float(result.values_of("focal_length").mean())
     return float(np.sqrt(variance)) / (focal_length * RAD_PER_MAS)
 
 

@@ -43,7 +43,8 @@ def with_moves(exposures: pd.DataFrame, moves: Iterable[Move]) -> pd.DataFrame:
 def span_numbers(exposures: pd.DataFrame) -> Int[np.ndarray, " exp"]:
     """Return the number of the span of each exposure, from 0, in order of the fields."""
     names = ["field_id", MOVES] if MOVES in exposures else ["field_id"]
-    return exposures.groupby(names).ngroup().to_numpy()
+    keys = np.stack([exposures[name].to_numpy() for name in names], axis=1)
+    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
 
 
 def motion_elements(

@@ -12,6 +12,7 @@ import pandas as pd
 from solver.data.instrument import Instrument
 from solver.data.parameter_group import Axis, Group
 from solver.data.parameters import PARAMETERS
+from solver.data.places import places_among
 from solver.data.settings import FitSettings
 
 
@@ -99,27 +100,37 @@ class FitResult:
     @cached_property
     def exposure_index(self) -> np.ndarray:
         """The row of `exposures` that each residual belongs to, shape (n,)."""
-        # Several times as fast as an index of pairs; figures ask for it at every change.
-        field, plate = (
-            pd.factorize(np.concatenate([self.exposures[name], self.residuals[name]]))[0]
-            for name in ("field_id", "plate_id")
+        known, values = (
+            [table[name].to_numpy() for name in ("field_id", "plate_id")]
+            for table in (self.exposures, self.residuals)
         )
-        keys = field * (int(plate.max(initial=0)) + 1) + plate
-        known, rows = np.split(keys, [len(self.exposures)])
-        place = np.empty(int(keys.max(initial=0)) + 1, dtype=np.intp)
-        place[known] = np.arange(len(known))
-        return place[rows]
+        return places_among(known, values)
+
+    @cached_property
+    def group_rows(self) -> Mapping[str, np.ndarray]:
+        """The rows of `calibration` of each parameter group, by its name, in table order."""
+        number, names = pd.factorize(self.calibration["group"])
+        return {str(name): np.flatnonzero(number == n) for n, name in enumerate(names)}
 
     def groups_on(self, axis: Axis) -> tuple[Group, ...]:
         """Return the parameter groups of the fit with one value per element of `axis`."""
-        known = set(self.calibration["group"].unique())
-        return tuple(g for g in PARAMETERS if g.axis == axis and g.name in known)
+        return tuple(g for g in PARAMETERS if g.axis == axis and g.name in self.group_rows)
 
     def labels_on(self, axis: Axis) -> pd.Series:
         """Return the words of each element of an axis; those of groups that differ, together."""
         is_here = self.calibration["group"].isin([group.name for group in self.groups_on(axis)])
         labels = self.calibration[is_here].groupby("element")["label"]
         return labels.agg(lambda names: " ".join(dict.fromkeys(names)))
+
+    def values_of(self, group: str, column: str = "value") -> np.ndarray:
+        """Return one column of `calibration` for a parameter group, in the order of its elements.
+
+        Raises
+        ------
+        KeyError
+            If the fit does not have the group.
+        """
+        return self.calibration[column].to_numpy()[self.group_rows[group]]
 
     def values_on(self, axis: Axis, column: str = "value") -> pd.DataFrame:
         """Return one column of `calibration` as a wide table.
@@ -134,12 +145,12 @@ class FitResult:
         One row per element of the axis, in order, and one column per group on the axis.
         """
         names = [group.name for group in self.groups_on(axis)]
-        place = pd.Index(names).get_indexer(self.calibration["group"])
-        is_here = place >= 0
-        element, values = (self.calibration[one].to_numpy()[is_here] for one in ("element", column))
+        of_group = [self.group_rows[name] for name in names]
+        here = np.concatenate([np.empty(0, dtype=np.intp), *of_group])
+        element, values = (self.calibration[one].to_numpy()[here] for one in ("element", column))
         rows, row = np.unique(element, return_inverse=True)
         # Filled in one go; to pivot, or to align series, would take several times as long.
         wide = np.full((len(rows), len(names)), np.nan)
-        wide[row, place[is_here]] = values
-        frame = pd.DataFrame(wide, rows, names)
-        return frame.rename_axis(index="element", columns="group")
+        wide[row, np.repeat(np.arange(len(names)), [len(one) for one in of_group])] = values
+        index, columns = pd.Index(rows, name="element"), pd.Index(names, name="group")
+        return pd.DataFrame(wide, index, columns)

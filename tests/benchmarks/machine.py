@@ -57,10 +57,10 @@ def processor_seconds(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def time_of(work: Callable[[], object], repeat: int) -> float:
-    """Return the median time, s."""
-    seconds = []
-    for _ in range(repeat):
+def time_of(work: Callable[[], object], repeat: int, least_seconds: float = 0.0) -> float:
+    """Return the median time, s, of at least `repeat` runs that take `least_seconds` together."""
+    seconds: list[float] = []
+    while len(seconds) < repeat or sum(seconds) < least_seconds:
         start = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - start)

@@ -43,8 +43,11 @@ def _gain_of_epoch(diagnosis: Diagnosis, shift: float) -> float:
     allow; and the time found without a shift, which is the same but for the weights of the stars.
     """
     rows = diagnosis.result.sources
-    rows = rows[rows["is_reference"].to_numpy(dtype=bool)]
-    at_each = (catalogue_chi2(one, shift).chi2.sum() for one in (rows, diagnosis.epoch.moved(rows)))
+    chosen = rows["is_reference"].to_numpy(dtype=bool)
+    at_each = (
+        catalogue_chi2(one, shift, chosen=chosen).chi2.sum()
+        for one in (rows, diagnosis.epoch.moved(rows))
+    )
     as_stated, moved = (float(one) / diagnosis.scale for one in at_each)
     return as_stated - moved - gains.PER_PARAMETER
 
@@ -85,10 +88,10 @@ def _anew(diagnosis: Diagnosis, kind: tuple[str, str], shift: float) -> list[Fou
     if len(names) < len(kind):
         return []
     rows = diagnosis.result.sources
-    rows = rows[rows["is_reference"].to_numpy(dtype=bool) == (kind is _REFERENCES)]
+    chosen = rows["is_reference"].to_numpy(dtype=bool) == (kind is _REFERENCES)
     if of_epoch(diagnosis):
         rows = diagnosis.epoch.moved(rows)
-    stars = catalogue_chi2(rows, shift)
+    stars = catalogue_chi2(rows, shift, chosen=chosen)
     chi2, dof = float(stars.chi2.sum()), 2.0 * len(stars.chi2)
     chance = log_chance(chi2, dof)
     numbers = chi2, dof, float(np.sqrt(2.0 * dof)), chance, sigmas(chance)
@@ -100,7 +103,7 @@ def _anew(diagnosis: Diagnosis, kind: tuple[str, str], shift: float) -> list[Fou
 def _of_stars(
     diagnosis: Diagnosis, stars: CatalogueChi2, tests: list[Test], kind: tuple[str, str]
 ) -> list[Found]:
-    ids, chi2, factor, rescaled = stars
+    chi2 = stars.chi2
     if not len(chi2):
         return []
     of_all, of_one = kind
@@ -108,14 +111,14 @@ def _of_stars(
     if worst.log_chance > limit_of(diagnosis):
         return []
     # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
-    far = rescaled > chdtri(2.0, -np.expm1(np.log1p(-_STAR_LIMIT) / len(chi2)))
+    far = stars.rescaled > chdtri(2.0, -np.expm1(np.log1p(-_STAR_LIMIT) / len(chi2)))
     # Catalogue errors of other stars may be mere bounds: a few that are further are no news then.
-    if not far.any() or (of_all == "others" and factor > _ALL_ARE_OFF):
+    if not far.any() or (of_all == "others" and stars.factor > _ALL_ARE_OFF):
         typical = max(float(np.median(chi2)) / MEDIAN_CHI2 / diagnosis.scale, 1.0)
         gain = gains.of_scale(typical, 2.0 * len(chi2))
-        return [Found(worst._replace(subject=of_all), gain, size=factor)]
+        return [Found(worst._replace(subject=of_all), gain, size=stars.factor)]
     order = np.argsort(-chi2[far])
-    named = tuple(int(one) for one in ids[far][order])
+    named = tuple(int(one) for one in stars.source_id[far][order])
     # As that of all other causes, by the scatter of the residuals.
     gain = float(np.sum(chi2[far] / diagnosis.scale - 2.0 * gains.PER_PARAMETER))
     return [Found(worst._replace(subject=of_one), gain, named, float(far.sum()))]

@@ -62,23 +62,25 @@ def epoch_offset(rows: pd.DataFrame, shift: float = 0.0) -> EpochOffset:
     unknown = EpochOffset(float("nan"), float("nan"))
     if "prior_pmra" not in rows:
         return unknown
-    known = np.isfinite(rows[["prior_pmra", "prior_pmdec"]].to_numpy(float)).all(axis=1)
-    rows = rows[known & rows["is_reference"].to_numpy(bool)]
-    stars = against_catalogue(rows)
-    motion = rows[["prior_pmra", "prior_pmdec"]].to_numpy(float)[stars.place]
-    motion /= DAYS_PER_JULIAN_YEAR
+    motion = np.stack([rows[f"prior_pm{axis}"].to_numpy(float) for axis in ("ra", "dec")], axis=1)
+    known = np.isfinite(motion).all(axis=1)
+    stars = against_catalogue(rows, known & rows["is_reference"].to_numpy(bool))
+    motion = motion[stars.place] / DAYS_PER_JULIAN_YEAR
     if len(motion) < _FEWEST_STARS or not np.ptp(motion, axis=0).any():
         return unknown
     to_axes = stars.axes.transpose(0, 2, 1) @ stars.inverse_root
     # The motion of each star, and a shift of all of them along either axis.
     design = np.concatenate([to_axes @ motion[:, :, None], to_axes], axis=2)
     shifts = shift**2 * np.sum(np.square(to_axes), axis=2)
-    fitted, is_used = np.zeros_like(stars.along), np.ones(len(motion), dtype=bool)
+    fitted, factor, is_used = np.zeros_like(stars.along), 0.0, np.zeros(len(motion), dtype=bool)
     for _ in range(_ROUNDS):
-        left = stars.along - fitted
+        left, before = stars.along - fitted, (factor, is_used)
         factor = error_factor(np.square(left), stars.shares, shifts)
         variance = stars.shares + (factor**2 - 1.0 + shifts) * stars.shares**2
         is_used = np.sum(np.square(left) / variance, axis=1) < chdtri(2.0, _RARE)
+        if factor == before[0] and np.array_equal(is_used, before[1]):
+            # The same stars with the same errors give the same again.
+            break
         by_share = stars.shares[:, :, None] * design
         weighted = (by_share / variance[:, :, None])[is_used].reshape(-1, 3)
         covariance = np.linalg.pinv(weighted.T @ by_share[is_used].reshape(-1, 3))

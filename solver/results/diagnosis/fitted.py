@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import linalg, sparse
+from scipy import sparse
 
+from solver.data.distortion_terms import terms
 from solver.data.result import FitResult
 from solver.results.diagnosis.columns import Columns
 from solver.results.diagnosis.modelled import (
@@ -37,7 +38,7 @@ def shared_columns(result: FitResult, camera: Camera, rows: Rows) -> list[Column
     They are per um of the detectors' places, pitches and the distortion, per rad, and per unit of
     each cause.
     """
-    calibration, width = result.calibration, prior_widths(result)
+    width = prior_widths(result)
     pixel, zeros = rows.pixel * camera.pitch[rows.detector], np.zeros(rows.n)
     vectors = (
         ("detector_rotation", (-pixel[:, 1], pixel[:, 0]), RAD_PER_ARCSEC),
@@ -53,10 +54,8 @@ def shared_columns(result: FitResult, camera: Camera, rows: Rows) -> list[Column
         on = (rows.detector == d).astype(float)
         columns.append(Scalar(on, width["detector_x"][d], width["detector_y"][d]))
         columns += [Vector(x * on, y * on, unit * width[name][d]) for name, (x, y), unit in turned]
-    labels = calibration.loc[calibration["group"] == "distortion_x", "label"]
     in_x, in_y = (legendre_at(along, _HIGHEST) for along in rows.at.T)
-    for number, label in enumerate(labels):
-        k, j = (int(one) for one in label[2:-1].split(","))
+    for number, (k, j) in enumerate(terms(int(result.summary["order"]))):
         sigmas = (width[f"distortion_{axis}"][number] for axis in "xy")
         columns.append(Scalar(in_x[k] * in_y[j], *sigmas))
     return [*columns, *modelled(result, camera, rows, width)]
@@ -97,21 +96,21 @@ class OfExposures(NamedTuple):
 def with_exposures(result: FitResult, camera: Camera, rows: Rows, columns: Columns) -> OfExposures:
     """Return the parameters of each exposure, and their products with columns."""
     taken = np.flatnonzero(np.diff(rows.first))
-    walk, in_walk = walk_terms(result, rows), walk_precision(result, taken)
+    walk = walk_terms(result, rows)
+    in_walk = walk_precision(result, taken) if walk else []
     in_x, in_y, own_precision = _of_one_exposure(result, camera, len(walk))
     basis = np.sqrt(rows.weight) * np.stack([np.ones(rows.n), *rows.at.T, *walk])
     kinds, width = in_x.shape
     precision = np.zeros((len(taken), kinds, len(taken), kinds))
-    for kind, one in enumerate([*own_precision, *np.repeat(in_walk, len(walk), axis=0)]):
+    in_walks = [of_axis for of_axis in in_walk for _ in walk]
+    for kind, one in enumerate([*own_precision, *in_walks]):
         precision[:, kind, :, kind] = one * np.eye(len(taken)) if np.ndim(one) == 0 else one
-    n = columns.scalar.shape[1]
     gram = np.zeros((len(taken), kinds, len(taken), kinds))
     products = np.empty((len(taken), kinds, columns.count))
     for e, (first, last) in enumerate(zip(rows.first[taken], rows.first[taken + 1], strict=True)):
-        own, some = basis[:, first:last], columns.of(slice(first, last))
-        scalar, square = own @ some.scalar, own @ own.T
-        products[e, :, :n], products[e, :, n : 2 * n] = in_x @ scalar, in_y @ scalar
-        products[e, :, 2 * n :] = in_x @ (own @ some.x) + in_y @ (own @ some.y)
+        own = basis[:, first:last]
+        square, with_values = own @ own.T, own @ columns.values[first:last]
+        products[e] = columns.from_axes(in_x @ with_values, in_y @ with_values)
         gram[e, :, e] = in_x @ square @ in_x.T + in_y @ square @ in_y.T
     size = len(taken) * kinds
     place = width * np.searchsorted(taken, rows.exposure)[:, None] + np.arange(width)
@@ -132,50 +131,68 @@ def _of_one_exposure(
     """Return `in_x` and `in_y` of `OfExposures`, and the precision of all but the walks."""
     precision = [0.0] * 4
     if has_anisotropy(result):
-        rows_of = result.calibration["group"] == "focal_anisotropy"
-        width = float(result.calibration.loc[rows_of, "prior_sigma"].iloc[0])
+        width = float(result.values_of("focal_anisotropy", "prior_sigma")[0])
         precision.append((0.5 * _PPM * width * camera.scale) ** -2)
-    none, each = np.zeros((n_walk, n_walk)), np.eye(n_walk)
-    in_x, in_y = (
-        linalg.block_diag(one[: len(precision)], np.concatenate(walks))
-        for one, walks in ((_IN_X, (each, none)), (_IN_Y, (none, each)))
-    )
+    first, width = len(precision), _IN_X.shape[1]
+    in_x, in_y = np.zeros((2, first + 2 * n_walk, width + n_walk))
+    in_x[:first, :width], in_y[:first, :width] = _IN_X[:first], _IN_Y[:first]
+    in_x[first : first + n_walk, width:] = in_y[first + n_walk :, width:] = np.eye(n_walk)
     return in_x, in_y, precision
 
 
 def source_variances(result: FitResult, camera: Camera) -> np.ndarray:
     """Return the variance of the prior of each source, along one axis, um^2, shape (sources,)."""
-    sigmas = result.sources[["prior_sigma_ra", "prior_sigma_dec"]].to_numpy()
-    return camera.um_per_mas**2 * np.square(sigmas).mean(axis=1)
+    ra, dec = (result.sources[f"prior_sigma_{axis}"].to_numpy(float) for axis in ("ra", "dec"))
+    return 0.5 * camera.um_per_mas**2 * (np.square(ra) + np.square(dec))
 
 
-def with_sources(
+class Absorbed(NamedTuple):
+    """What the positions of the sources absorb of products over all rows.
+
+    Attributes
+    ----------
+    gram : of the columns with each other, shape (columns, columns)
+    between : of the parameters of the exposures with the columns, shape (parameters, columns)
+    exposures : of these parameters with each other, shape (parameters, parameters)
+    """
+
+    gram: np.ndarray
+    between: np.ndarray
+    exposures: np.ndarray
+
+
+def absorbed_by_positions(
     result: FitResult, camera: Camera, rows: Rows, columns: Columns, exposures: OfExposures
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the products of the positions with columns, and with those of the exposures.
+) -> Absorbed:
+    """Return what the positions absorb.
 
-    They are over the root of the precision of the positions if all else is held fixed, so that
-    their squares are what the positions absorb; shapes (2 sources, columns), and (2 sources,
-    parameters of the exposures).
+    It is the square of the products of a position with columns, over the root of its precision if
+    all else is held fixed.
     """
     source, known = pd.factorize(rows.source)
-    n, count = columns.scalar.shape[1], len(known)
+    count = len(known)
     prior = source_variances(result, camera)[known]
     precision = np.bincount(source, rows.weight, count) + 1.0 / prior
-    factor = np.sqrt(rows.weight / precision[source])
-    roll = camera.roll[rows.exposure]
-    c, s = (
-        sparse.csr_matrix((factor * values, (source, np.arange(rows.n))), shape=(count, rows.n))
-        for values in (np.cos(roll), np.sin(roll))
+    order = np.argsort(source, kind="stable")
+    ends = np.cumsum(np.bincount(source, minlength=count))
+    factor = np.sqrt(rows.weight / precision[source])[order]
+    roll = camera.roll[rows.exposure[order]]
+    # Onto the sky: along x times the cosine of the roll in one axis, and the sine in the other.
+    waves, starts = np.concatenate([np.cos(roll), np.sin(roll)]), [0, *ends, *(rows.n + ends)]
+    onto_sky = sparse.csr_matrix(
+        (np.tile(factor, 2) * waves, np.tile(order, 2), starts), shape=(2 * count, rows.n)
     )
-    of_columns = np.empty((2 * count, columns.count))
-    ra, dec = of_columns[:count], of_columns[count:]
-    ra[:, :n] = dec[:, n : 2 * n] = c @ columns.scalar
-    dec[:, :n] = s @ columns.scalar
-    ra[:, n : 2 * n] = -dec[:, :n]
-    ra[:, 2 * n :] = c @ columns.x - s @ columns.y
-    dec[:, 2 * n :] = s @ columns.x + c @ columns.y
+    on_sky = onto_sky @ columns.values
+    across = on_sky[count:].T @ on_sky[:count]
     in_x, in_y = exposures.in_x.T, exposures.in_y.T
-    along, across = ((one @ exposures.basis).toarray().reshape(-1, len(in_x)) for one in (c, s))
-    of_exposures = np.concatenate([along @ in_x - across @ in_y, across @ in_x + along @ in_y])
-    return of_columns, of_exposures.reshape(2 * count, -1)
+    cosine, sine = np.split((onto_sky @ exposures.basis).toarray().reshape(-1, len(in_x)), 2)
+    ra = (cosine @ in_x - sine @ in_y).reshape(count, -1)
+    dec = (sine @ in_x + cosine @ in_y).reshape(count, -1)
+    # Along x, and along y.
+    both = np.block([[ra, dec], [dec, -ra]])
+    with_values = np.split(both.T @ on_sky, 2)
+    return Absorbed(
+        columns.products(on_sky.T @ on_sky, across - across.T),
+        columns.from_axes(*with_values),
+        ra.T @ ra + dec.T @ dec,
+    )

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.polynomial import legendre
 from scipy import linalg
 
@@ -54,14 +53,13 @@ Column = Scalar | Vector
 
 def has_anisotropy(result: FitResult) -> bool:
     """Return whether each exposure has a focal length for each axis."""
-    return bool((result.calibration["group"] == "focal_anisotropy").any())
+    return "focal_anisotropy" in result.group_rows
 
 
 def prior_widths(result: FitResult) -> dict[str, np.ndarray]:
     """Return the widths of the priors of each group of parameters, by its name."""
-    group, names = pd.factorize(result.calibration["group"])
     sigma = result.calibration["prior_sigma"].to_numpy()
-    return {name: sigma[group == number] for number, name in enumerate(names)}
+    return {name: sigma[rows] for name, rows in result.group_rows.items()}
 
 
 def modelled(
@@ -74,13 +72,15 @@ def modelled(
     widths : of the priors
     """
     yield from _of_terms(result, camera, rows, widths)
-    yield from _of_detectors(camera, rows, widths, _faintness(result)[rows.source])
+    yield from _of_detectors(result, camera, rows, widths)
     yield from _of_motion(camera, rows, widths)
 
 
 def walk_terms(result: FitResult, rows: Rows) -> list[np.ndarray]:
     """Return the terms of the distortion that change from exposure to exposure as random walks."""
     degree = min(result.settings.drift_walk, int(result.summary["order"]))
+    if not terms(degree):
+        return []
     x, y = (legendre.legvander(along, max(degree, 1)).T for along in rows.at.T)
     return [x[k] * y[j] for k, j in terms(degree)]
 
@@ -104,64 +104,79 @@ def _of_terms(
     result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
 ) -> Iterator[Column]:
     """Yield the columns of terms of the distortion that drift, breathe, or are of a part."""
-    settings, at = result.settings, camera.scale * rows.at
-    field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
-    later, detectors = np.arange(1, field.max() + 1), np.arange(len(camera.turn))
-    in_time = legendre.legvander(2.0 * camera.time, settings.drift_in_time)[:, 1:].T
-    own = at - camera.centre[rows.detector]
-    half = (camera.half * camera.pitch).max(axis=1)[rows.detector, None]
+    settings = result.settings
     families = (
-        ("drift", settings.drift, in_time[:, rows.exposure], rows.at),
-        (
-            "breathing",
-            settings.breathing,
-            np.array([np.cos(camera.phase), np.sin(camera.phase)])[:, rows.exposure],
-            rows.at,
-        ),
-        (
-            "field_distortion",
-            settings.field_distortion,
-            (field[rows.exposure] == later[:, None]).astype(float),
-            rows.at,
-        ),
-        (
-            "own_distortion",
-            settings.detector_distortion,
-            (rows.detector == detectors[:, None]).astype(float),
-            own / half,
-        ),
+        ("drift", settings.drift, _powers_of_time),
+        ("breathing", settings.breathing, _orbital_waves),
+        ("field_distortion", settings.field_distortion, _later_fields),
+        ("own_distortion", settings.detector_distortion, _each_detector),
     )
-    for name, order, factors, place in families:
-        sigmas = widths.get(f"{name}_x", np.empty(0)), widths.get(f"{name}_y", np.empty(0))
-        of_order = terms(order)
+    for name, order, factors_of in families:
+        if f"{name}_x" not in widths:
+            continue
+        factors, of_order = factors_of(result, camera, rows), terms(order)
+        sigmas = widths[f"{name}_x"], widths[f"{name}_y"]
         if len(sigmas[0]) != len(factors) * len(of_order):
             continue
+        place = _on_detector(camera, rows) if name == "own_distortion" else rows.at
         in_x, in_y = (legendre.legvander(along, order).T for along in place.T)
         values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in of_order)
         for number, value in enumerate(values):
             yield Scalar(value, sigmas[0][number], sigmas[1][number])
 
 
+def _powers_of_time(result: FitResult, camera: Camera, rows: Rows) -> np.ndarray:
+    in_time = legendre.legvander(2.0 * camera.time, result.settings.drift_in_time)
+    return in_time[:, 1:].T[:, rows.exposure]
+
+
+def _orbital_waves(result: FitResult, camera: Camera, rows: Rows) -> np.ndarray:
+    del result
+    return np.array([np.cos(camera.phase), np.sin(camera.phase)])[:, rows.exposure]
+
+
+def _later_fields(result: FitResult, camera: Camera, rows: Rows) -> np.ndarray:
+    del camera
+    field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
+    later = np.arange(1, field.max() + 1)
+    return (field[rows.exposure] == later[:, None]).astype(float)
+
+
+def _each_detector(result: FitResult, camera: Camera, rows: Rows) -> np.ndarray:
+    del result
+    return (rows.detector == np.arange(len(camera.turn))[:, None]).astype(float)
+
+
+def _on_detector(camera: Camera, rows: Rows) -> np.ndarray:
+    """Return the place on its detector of each row, over half the size of the detector."""
+    half = (camera.half * camera.pitch).max(axis=1)
+    own = camera.scale * rows.at - camera.centre[rows.detector]
+    return own / half[rows.detector, None]
+
+
 def _of_detectors(
-    camera: Camera, rows: Rows, widths: dict[str, np.ndarray], fainter: np.ndarray
+    result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
 ) -> Iterator[Column]:
     """Yield the columns of the groups with one parameter of each detector."""
-    pixel = rows.pixel
-    crossed = 0.5 * rows.local + 0.5
-    angle, none = 2.0 * np.pi * pixel, np.zeros(rows.n)
-    shift = PIX_PER_MPIX * fainter
-    shifts: dict[str, tuple[np.ndarray, int]] = {"detector_skew": (RAD_PER_ARCSEC * pixel[:, 1], 0)}
+    none = np.zeros(rows.n)
+    # Displacement along each axis, pixels, by its own coordinate.
+    along: dict[str, Callable[[int], np.ndarray]] = {
+        "magnitude_shift": lambda _: PIX_PER_MPIX * _faintness(result)[rows.source],
+        "charge_transfer": lambda axis: (
+            PIX_PER_MPIX * _faintness(result)[rows.source] * (0.5 * rows.local[:, axis] + 0.5)
+        ),
+        "phase_sine": lambda axis: PIX_PER_MPIX * np.sin(2.0 * np.pi * rows.pixel[:, axis]),
+        "phase_cosine": lambda axis: PIX_PER_MPIX * np.cos(2.0 * np.pi * rows.pixel[:, axis]),
+    }
+    shifts: dict[str, tuple[Callable[[int], np.ndarray], int]] = {
+        "detector_skew": (lambda _: RAD_PER_ARCSEC * rows.pixel[:, 1], 0)
+    }
     for axis, direction in enumerate("xy"):
-        along = {
-            "magnitude_shift": shift,
-            "charge_transfer": shift * crossed[:, axis],
-            "phase_sine": PIX_PER_MPIX * np.sin(angle[:, axis]),
-            "phase_cosine": PIX_PER_MPIX * np.cos(angle[:, axis]),
-        }
-        shifts |= {f"{name}_{direction}": (value, axis) for name, value in along.items()}
-    for name, (value, axis) in shifts.items():
+        shifts |= {f"{name}_{direction}": (of_axis, axis) for name, of_axis in along.items()}
+    for name, (of_axis, axis) in shifts.items():
         if name not in widths:
             continue
+        value = of_axis(axis)
         pixels = np.stack([value, none] if axis == 0 else [none, value], axis=1)
         x, y = onto_focal_plane(pixels * camera.pitch[rows.detector], camera.turn, rows.detector).T
         for detector, sigma in enumerate(widths[name]):

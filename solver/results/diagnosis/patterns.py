@@ -85,7 +85,9 @@ class Patterns:
         self.times = _times(camera)
         self.degrees = [*VARIABLE, *(n for n in degrees_above(order) if n not in VARIABLE)]
         self.terms = [(n - j, j) for n in self.degrees for j in range(n + 1)]
-        self.place, self.time = np.array(list(self._columns(order))).T
+        pairs = list(self._columns(order))
+        self.place, self.time = np.array(pairs).T
+        self._number = {pair: number for number, pair in enumerate(pairs)}
         self.families = families(self, order)
 
     def __len__(self) -> int:
@@ -110,7 +112,7 @@ class Patterns:
 
     def column(self, place: int, time: int) -> int:
         """Return the column of a spatial function and a time."""
-        return int(np.flatnonzero((self.place == place) & (self.time == time))[0])
+        return self._number[place, time]
 
     def of_degree(self, degree: int, time: int) -> np.ndarray:
         """Return the columns of the terms of a degree at a time, x and y of each in turn."""
@@ -201,8 +203,8 @@ def _times(camera: Camera) -> np.ndarray:
 def cell_of(rows: Rows) -> np.ndarray:
     """Return the number of the cell of each row."""
     # The largest coordinate is in the last cell.
-    column, row = np.minimum((0.5 * CELLS * (rows.local.T + 1.0)).astype(np.intp), CELLS - 1)
-    return (rows.detector * CELLS + row) * CELLS + column
+    column, row = np.minimum((0.5 * CELLS * (rows.local.T + 1.0)).astype(np.int8), CELLS - 1)
+    return rows.detector * CELLS**2 + (row * CELLS + column)
 
 
 def legendre_at(along: np.ndarray, degree: int) -> list[np.ndarray]:

@@ -45,21 +45,27 @@ def prior_rms(result: FitResult) -> list[PriorRms]:
 
     The prior of a random walk is one of its steps, and is none of these.
     """
-    rows = result.calibration
-    prior = rows["prior_sigma"] ** 2
+    prior, marginal, offset = (
+        result.calibration[name].to_numpy(dtype=float)
+        for name in ("prior_sigma", "sigma_marginal", "offset")
+    )
+    known = np.isfinite(prior) & (prior > 0.0)
     # Of the prior's variance, what the measurements remove.
-    share = 1.0 - rows["sigma_marginal"] ** 2 / prior
-    is_decided = np.isfinite(prior) & (prior > 0.0) & (share > _LEAST_SHARE)
-    rows, expected = rows[is_decided], (share * prior)[is_decided]
-    means = (rows["offset"] ** 2 / expected).groupby(rows["group"], sort=False).mean()
-    means = means[[BY_NAME[str(name)].axis != "walk" for name in means.index]]
+    removed = np.where(known, np.square(prior) - np.square(marginal), 0.0)
+    is_decided = removed > _LEAST_SHARE * np.square(prior)
+    squares = np.divide(np.square(offset), removed, out=np.zeros_like(offset), where=is_decided)
+    means = {
+        name: float(squares[rows].sum() / is_decided[rows].sum())
+        for name, rows in result.group_rows.items()
+        if BY_NAME[name].axis != "walk" and is_decided[rows].any()
+    }
     by_hand = {*result.settings.prior_widths}
     by_hand |= {split_name(name)[0].name for name in result.settings.prior_shifts}
     return [
         PriorRms(
-            str(name),
+            name,
             float(np.sqrt(square)),
-            of_many(log_chance(float(square), 1.0), len(means)),
+            of_many(log_chance(square, 1.0), len(means)),
             name in by_hand,
         )
         for name, square in means.items()

@@ -20,10 +20,10 @@ from scipy import linalg
 from solver.data.result import FitResult
 from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.fitted import (
+    absorbed_by_positions,
     precision_of,
     shared_columns,
     with_exposures,
-    with_sources,
 )
 from solver.results.diagnosis.patterns import Family, Patterns
 from solver.results.diagnosis.rows import Camera, Rows
@@ -67,23 +67,24 @@ class Projection(NamedTuple):
 
     def evidence(self, family: Family) -> Evidence:
         """Return what the residuals say of a family."""
-        weights = np.eye(len(family.columns)) if family.weights is None else family.weights
-        products = weights.T @ self.products[family.columns]
-        square = np.ix_(family.columns, family.columns)
-        total = weights.T @ self.total[square] @ weights
-        left = weights.T @ self.left[square] @ weights
+        square, weights = np.ix_(family.columns, family.columns), family.weights
+        products, total, left = self.products[family.columns], self.total[square], self.left[square]
+        if weights is not None:
+            products = weights.T @ products
+            total, left = (weights.T @ of_columns @ weights for of_columns in (total, left))
         # In directions in which the patterns are independent before the fit.
-        values, vectors = linalg.eigh(total)
+        values, vectors = _eigenvectors(total)
         whole = values > 1e-9 * values[-1]
         scaled = vectors[:, whole] / np.sqrt(values[whole])
-        shares, turned = linalg.eigh(scaled.T @ left @ scaled)
+        shares, turned = np.linalg.eigh(scaled.T @ left @ scaled)
         is_left = shares > _LEAST_LEFT
         basis = scaled @ turned[:, is_left]
         along = basis.T @ products
         found = basis @ (along / shares[is_left])
         chi2 = float(np.sum(along**2 / shares[is_left]))
         size = float(np.sqrt(max(found @ total @ found, 0.0) / max(self.weight, 1e-300)))
-        return Evidence(chi2, int(is_left.sum()), weights @ found, size)
+        amplitude = found if weights is None else weights @ found
+        return Evidence(chi2, int(is_left.sum()), amplitude, size)
 
     def without(self, family: Family) -> "Projection":
         """Return the projection after the patterns of a family are fitted, too."""
@@ -93,6 +94,18 @@ class Projection(NamedTuple):
         inverse = linalg.pinvh(own, rtol=1e-6)
         products = self.products - cross @ (inverse @ (weights.T @ self.products[family.columns]))
         return self._replace(products=products, left=self.left - cross @ inverse @ cross.T)
+
+
+def _eigenvectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the eigenvalues and eigenvectors of a symmetric matrix, at once if it is diagonal.
+
+    That of patterns without a place in common, as those of cells, is.
+    """
+    diagonal = np.diag(matrix)
+    if np.count_nonzero(matrix) <= np.count_nonzero(diagonal):
+        order = np.argsort(diagonal)
+        return diagonal[order], np.eye(len(diagonal))[:, order]
+    return np.linalg.eigh(matrix)
 
 
 def covariance_of_products(
@@ -176,10 +189,11 @@ class _Sums(NamedTuple):
         fitted += self.precision
         # Shifts of all exposures against those of all detectors may have no prior.
         fitted[np.diag_indices(len(fitted))] *= 1.0 + 1e-9
-        factor = linalg.cho_factor(fitted, lower=True, check_finite=False)
+        factor = linalg.cholesky(fitted, lower=True, check_finite=False)
         cross = ratio * np.concatenate([self.between[:, ours], self.gram[shared, ours]])
         left = ratio * self.gram[ours, ours]
-        left -= cross.T @ linalg.cho_solve(factor, cross, check_finite=False)
+        absorbed = linalg.solve_triangular(factor, cross, lower=True, check_finite=False)
+        left -= absorbed.T @ absorbed
         # In few exposures, a source takes too much of what changes from one exposure to the next.
         left[np.ix_(self.columns, self.columns)] = ratio * self.fast
         return ratio * self.total, left
@@ -187,21 +201,21 @@ class _Sums(NamedTuple):
 
 def _sums(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -> _Sums:
     shared = shared_columns(result, camera, rows)
-    columns = columns_at(patterns, rows).with_(shared, np.sqrt(rows.weight))
-    ours = order_of(patterns, columns.scalar.shape[1])
+    columns = columns_at(patterns, rows, shared, np.sqrt(rows.weight))
+    ours = order_of(patterns, columns.n_scalars)
     order = np.concatenate([ours, np.setdiff1d(np.arange(columns.count), ours)])
     gram, exposures = columns.gram(), with_exposures(result, camera, rows, columns)
     total = gram[np.ix_(ours, ours)]
-    of_columns, of_exposures = with_sources(result, camera, rows, columns, exposures)
-    gram -= of_columns.T @ of_columns
-    number = ours[patterns.fast] - 2 * columns.scalar.shape[1]
-    kept = np.concatenate([columns.x[:, number], columns.y[:, number]])
+    absorbed = absorbed_by_positions(result, camera, rows, columns, exposures)
+    gram -= absorbed.gram
+    number, (_, *vectors) = ours[patterns.fast] - 2 * columns.n_scalars, columns.parts
+    kept = np.concatenate([one[:, number] for one in vectors])
     return _Sums(
         float(rows.weight.sum()),
         total,
         gram[np.ix_(order, order)],
-        (exposures.with_columns - of_exposures.T @ of_columns)[:, order],
-        exposures.gram - of_exposures.T @ of_exposures,
+        (exposures.with_columns - absorbed.between)[:, order],
+        exposures.gram - absorbed.exposures,
         kept.T @ (np.tile(rows.left, 2)[:, None] * kept),
         linalg.block_diag(exposures.precision, np.diag(precision_of(shared))),
         patterns.fast,

@@ -5,6 +5,8 @@ catalogue and C of the estimate. Its chi2 is that of the catalogue position agai
 without it (leave one out), with two degrees of freedom.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -19,45 +21,67 @@ _LEAST_SHARE = 1e-6
 # Median of a chi2 with two degrees of freedom.
 MEDIAN_CHI2 = 1.3863
 _LARGEST_FACTOR = 1e6
+# Of the logarithm of a factor.
+_ROUNDING = 1e-9
 
 
-class CatalogueChi2(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class CatalogueChi2:
     """The catalogue position of each star of a kind against the fit without it.
 
     Attributes
     ----------
     source_id : of the stars that the measurements determine, shape (n,)
-    chi2 : with two degrees of freedom, shape (n,)
-    factor : by which the errors of the catalogue are larger than stated, at least 1, so that the
-        median chi2 is as expected
-    rescaled : chi2 with errors of the catalogue that are so much larger, shape (n,)
+    stars : their deviations from the catalogue
+    shift : of the fitted positions by an error of the model, rms along each axis, mas
     """
 
     source_id: np.ndarray
-    chi2: np.ndarray
-    factor: float
-    rescaled: np.ndarray
+    stars: "AgainstCatalogue"
+    shift: float
+
+    @cached_property
+    def chi2(self) -> np.ndarray:
+        """Of each star, with two degrees of freedom, shape (n,)."""
+        return _chi2(*self._parts, 1.0)
+
+    @cached_property
+    def factor(self) -> float:
+        """By how much the errors of the catalogue are larger than stated, at least 1.
+
+        The median chi2 is as expected with it.
+        """
+        return error_factor(*self._parts)
+
+    @property
+    def rescaled(self) -> np.ndarray:
+        """Return chi2 with errors of the catalogue that are so much larger."""
+        return _chi2(*self._parts, self.factor)
+
+    @cached_property
+    def _parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the squares of the deviations, the shares, and the squares of the shift."""
+        stars = self.stars
+        shifts = np.zeros_like(stars.shares)
+        if self.shift:
+            inverse_root = stars.axes.transpose(0, 2, 1) @ stars.inverse_root
+            shifts = self.shift**2 * np.sum(np.square(inverse_root), axis=2)
+        return np.square(stars.along), stars.shares, shifts
 
 
-def catalogue_chi2(rows: pd.DataFrame, shift: float = 0.0) -> CatalogueChi2:
+def catalogue_chi2(
+    rows: pd.DataFrame, shift: float = 0.0, *, chosen: np.ndarray | None = None
+) -> CatalogueChi2:
     """Return the chi2 of the catalogue positions of stars.
 
     Parameters
     ----------
     rows : of `schema.SOURCES`
-    shift : of the fitted positions by an error of the model, rms along each axis, mas
+    shift : as of the result
+    chosen : whether to take a row, shape (rows,); None for all
     """
-    stars = against_catalogue(rows)
-    along = np.square(stars.along)
-    inverse_root = stars.axes.transpose(0, 2, 1) @ stars.inverse_root
-    shifts = shift**2 * np.sum(np.square(inverse_root), axis=2)
-    factor = error_factor(along, stars.shares, shifts)
-    return CatalogueChi2(
-        rows["source_id"].to_numpy()[stars.place],
-        _chi2(along, stars.shares, shifts, 1.0),
-        factor,
-        _chi2(along, stars.shares, shifts, factor),
-    )
+    stars = against_catalogue(rows, chosen)
+    return CatalogueChi2(rows["source_id"].to_numpy()[stars.place], stars, shift)
 
 
 class AgainstCatalogue(NamedTuple):
@@ -65,7 +89,7 @@ class AgainstCatalogue(NamedTuple):
 
     Attributes
     ----------
-    place : of the stars in their table, shape (n,)
+    place : row of the stars in their table, shape (n,)
     along : deviations in units of the catalogue's errors, shape (n, 2)
     shares : of the catalogue's variance that the measurements remove, shape (n, 2)
     axes : columns are the axes, shape (n, 2, 2)
@@ -79,19 +103,23 @@ class AgainstCatalogue(NamedTuple):
     inverse_root: np.ndarray
 
 
-def against_catalogue(rows: pd.DataFrame) -> AgainstCatalogue:
+def against_catalogue(rows: pd.DataFrame, chosen: np.ndarray | None = None) -> AgainstCatalogue:
     """Return the deviations of those stars from the catalogue that the measurements determine.
 
     Parameters
     ----------
     rows : of `schema.SOURCES`
+    chosen : whether to take a row, shape (rows,); None for all
     """
-    used = rows[["prior_sigma_ra", "prior_sigma_dec", "sigma_ra_marginal", "sigma_dec_marginal"]]
-    place = np.flatnonzero(np.isfinite(used.to_numpy(dtype=float)).all(axis=1))
-    rows = rows.iloc[place]
     prior = covariance(rows, "prior_sigma_ra", "prior_sigma_dec", "prior_corr")
     marginal = covariance(rows, "sigma_ra_marginal", "sigma_dec_marginal", "corr_marginal")
-    offset = rows[["offset_ra", "offset_dec"]].to_numpy(dtype=float)
+    variances = [of_all[:, axis, axis] for of_all in (prior, marginal) for axis in (0, 1)]
+    is_known = np.isfinite(variances).all(axis=0)
+    place = np.flatnonzero(is_known if chosen is None else is_known & chosen)
+    prior, marginal = prior[place], marginal[place]
+    offset = np.stack(
+        [rows[f"offset_{axis}"].to_numpy(dtype=float)[place] for axis in ("ra", "dec")], axis=1
+    )
     inverse_root = _inverse_root(prior)
     share = np.eye(2) - inverse_root @ marginal @ inverse_root.transpose(0, 2, 1)
     shares, axes = _eigenvectors(share)
@@ -139,7 +167,8 @@ def _chi2(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray, factor: flo
     shares : s, shape (n, 2)
     shifts : e^2 along the eigenvectors, shape (n, 2)
     """
-    return np.sum(along / (shares + (factor**2 - 1.0 + shifts) * shares**2), axis=1)
+    first, second = (along / (shares + (factor**2 - 1.0 + shifts) * shares**2)).T
+    return first + second
 
 
 def error_factor(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray) -> float:
@@ -155,7 +184,9 @@ def error_factor(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray) -> f
     if not len(along) or excess(0.0) <= 0.0:
         return 1.0
     most = float(np.log(_LARGEST_FACTOR))
-    return float(np.exp(brentq(excess, 0.0, most))) if excess(most) < 0.0 else _LARGEST_FACTOR
+    if excess(most) >= 0.0:
+        return _LARGEST_FACTOR
+    return float(np.exp(brentq(excess, 0.0, most, xtol=_ROUNDING)))
 
 
 def covariance(rows: pd.DataFrame, first: str, second: str, correlation: str) -> np.ndarray:

@@ -78,7 +78,7 @@ def _heaviest_exposures(rows: Rows, camera: Camera) -> tuple[Rows, Camera]:
     spans = int(camera.span.max()) + 1
     each = int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / spans)
     count = max(each, _LEAST_EXPOSURES, -(-_LEAST_IN_ALL // spans))
-    of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
+    of_exposure = rows.in_exposures(rows.weight)
     factor, time = np.zeros(len(camera.time)), camera.time.copy()
     for span in np.unique(camera.span):
         of_span = np.flatnonzero((camera.span == span) & (of_exposure > 0.0))
@@ -92,7 +92,8 @@ def _heaviest_exposures(rows: Rows, camera: Camera) -> tuple[Rows, Camera]:
             is_heavy = of_exposure[group] >= (1.0 - _ROUNDING) * of_exposure[group].max()
             heaviest = group[np.argmax(is_heavy)]
             time[heaviest], factor[heaviest] = node, weight / of_exposure[heaviest]
-    some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
+    parts = [np.arange(*rows.first[e : e + 2]) for e in np.flatnonzero(factor)]
+    some = rows.of(np.concatenate([np.empty(0, dtype=np.intp), *parts]))
     # All times are the same, with a single exposure among them.
     rate = np.ptp(camera.phase) / max(float(np.ptp(camera.time)), 1e-12)
     phase = camera.phase + rate * (time - camera.time)

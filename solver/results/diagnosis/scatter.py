@@ -48,24 +48,29 @@ def scatter_tests(
     used = ~rows.is_far
     if without is not None and len(without):
         used &= ~np.isin(rows.exposure, without)
-    chi2, dof = used * rows.chi2, used * 2.0 * rows.left
-    total, freedom = float(chi2.sum()) - explained, max(float(dof.sum()), 1.0)
+    weight = used.astype(float)
+    chi2, dof = weight * rows.chi2, (2.0 * weight) * rows.left
+    of_runs = rows.in_runs(chi2), rows.in_runs(dof)
+    of_sources = [np.bincount(rows.source, one, len(magnitude)) for one in (chi2, dof)]
+    total, freedom = float(of_runs[0].sum()) - explained, max(float(of_runs[1].sum()), 1.0)
     scale = max(total / freedom, 1e-300)
     whole = float(_normalised(np.array([total]), np.array([freedom]))[0])
     spread = float(np.sqrt(2.0 / freedom))
     # Groups are compared with each other: what is explained is in all of them.
-    relative = chi2 / max(float(chi2.sum()) / freedom, 1e-300)
+    typical = max(float(of_runs[0].sum()) / freedom, 1e-300)
+    for one in (of_runs[0], of_sources[0]):
+        one /= typical
     found = [
         Scatter("noise", scale, 1.0, spread, log_chance_normal(whole), freedom),
-        _dispersion("exposures", rows.exposure, relative, dof),
-        _dispersion("sources", rows.source, relative, dof),
-        _dispersion("detectors", rows.detector, relative, dof),
+        _dispersion("exposures", *(_summed(rows.exposure[rows.runs], one) for one in of_runs)),
+        _dispersion("sources", *of_sources),
+        _dispersion("detectors", *(_summed(rows.detector[rows.runs], one) for one in of_runs)),
     ]
-    slope = _slope(rows.source, magnitude, relative, dof)
+    slope = _slope(magnitude, *of_sources)
     count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
     chance = log_chance_poisson(count, expected)
     far = Scatter("outliers", count, expected, float(np.sqrt(expected)), chance)
-    tails = _kurtosis(rows.exposure, chi2, dof)
+    tails = _kurtosis(rows, chi2, dof)
     return [*found, *([slope] if slope else []), far, tails]
 
 
@@ -75,11 +80,15 @@ def _normalised(chi2: np.ndarray, dof: np.ndarray) -> np.ndarray:
     return (np.cbrt(np.maximum(chi2, 0.0) / dof) - (1.0 - spread)) / np.sqrt(spread)
 
 
-def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
+def _summed(group: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the sums of values over groups."""
+    return np.bincount(group, values)
+
+
+def _dispersion(name: str, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
     """Return whether the chi2 of groups scatter about their expected values as by chance."""
-    of_chi2, of_dof = np.bincount(group, chi2), np.bincount(group, dof)
-    known = of_dof > FEWEST
-    z = _normalised(of_chi2[known], of_dof[known])
+    known = dof > FEWEST
+    z = _normalised(chi2[known], dof[known])
     freedom = max(float(known.sum()) - 1.0, 0.0)
     squares = float(np.sum(z**2))
     log_p = log_chance(squares, freedom) if freedom else 0.0
@@ -87,7 +96,7 @@ def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray)
     return Scatter(name, value, 1.0, float(np.sqrt(2.0 / max(freedom, 1.0))), log_p, freedom)
 
 
-def _kurtosis(exposure: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
+def _kurtosis(rows: Rows, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
     """Return the excess kurtosis of a residual, whatever the scale of its exposure; normal is 0.
 
     Half of chi2 of both axes over its expected value is an exponential deviate, of which the
@@ -96,9 +105,9 @@ def _kurtosis(exposure: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatte
     """
     known = dof > _LEAST_DOF
     half = np.divide(chi2, dof, out=np.zeros(len(chi2)), where=known)
-    counts = np.bincount(exposure, known)
-    mean = np.bincount(exposure, half) / np.maximum(counts, 1.0)
-    squares = np.bincount(exposure, half * half) / np.maximum(mean**2, 1e-300)
+    counts = rows.in_exposures(known.astype(float))
+    mean = rows.in_exposures(half) / np.maximum(counts, 1.0)
+    squares = rows.in_exposures(np.square(half, out=half)) / np.maximum(mean**2, 1e-300)
     # Squares of exponential deviates over the mean of n of them are 2 n / (n + 1) on average.
     squares *= (counts + 1.0) / np.maximum(counts, 1.0)
     n = max(float(counts.sum()), 1.0)
@@ -108,18 +117,17 @@ def _kurtosis(exposure: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatte
     return Scatter("kurtosis", value, 0.0, scatter, chance, n)
 
 
-def _slope(
-    source: np.ndarray, magnitude: np.ndarray, chi2: np.ndarray, dof: np.ndarray
-) -> Scatter | None:
-    """Return whether chi2 over its expected value changes with the magnitude, per magnitude."""
-    of_chi2 = np.bincount(source, chi2, len(magnitude))
-    of_dof = np.bincount(source, dof, len(magnitude))
-    known = np.isfinite(magnitude) & (of_dof > 0.0)
+def _slope(magnitude: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatter | None:
+    """Return whether chi2 of sources over its expected value changes with the magnitude.
+
+    Per magnitude; all of shape (sources,).
+    """
+    known = np.isfinite(magnitude) & (dof > 0.0)
     if not known.any() or float(np.ptp(magnitude[known])) == 0.0:
         return None
-    weight, at = of_dof[known], magnitude[known]
+    weight, at = dof[known], magnitude[known]
     centred = at - np.average(at, weights=weight)
     squares = float(np.sum(weight * centred**2))
-    value = float(np.sum(centred * of_chi2[known]) / squares)
+    value = float(np.sum(centred * chi2[known]) / squares)
     scatter = float(np.sqrt(2.0 / squares))
     return Scatter("magnitudes", value, 0.0, scatter, log_chance_normal(value / scatter))

@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from scipy.spatial import cKDTree
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.rate import log_chance_poisson
-from solver.results.diagnosis.rows import FAR
+from solver.results.diagnosis.rows import FAR, Rows
 
 # Of its own residual: how near one has to be to where the other should be. The positions of
 # both stars are off, too, by the share that one wrong measurement has in them.
@@ -34,36 +33,38 @@ class Swapped(NamedTuple):
     chi2: float
 
 
-def swapped(result: FitResult) -> Swapped:
+def swapped(result: FitResult, rows: Rows) -> Swapped:
     """Return the measurements far off that are where another one far off should be, and it there.
 
     It holds in a solution that such measurements keep from converging, as long as most stars are
     near their places.
+
+    Parameters
+    ----------
+    rows : with all exposures
     """
-    table = result.residuals
-    axes = [
-        [table[f"{name}{axis}"].to_numpy(dtype=float) for name in ("residual_", "s", "n")]
-        for axis in "xy"
-    ]
-    chi2 = np.sum([np.square(residual / sigma) for residual, sigma, _ in axes], axis=0)
-    chosen = np.flatnonzero(chi2 > FAR**2)
-    residual, at = (np.stack([axis[k][chosen] for axis in axes], axis=1) for k in (0, 2))
-    area = float(np.prod([np.ptp(of_all) for *_, of_all in axes]))
+    table, far = result.residuals, rows.chi2 > FAR**2
+    chosen, chi2 = rows.stored[far], rows.chi2[far]
+    residual, at = (
+        np.stack([table[f"{name}{axis}"].to_numpy(dtype=float)[chosen] for axis in "xy"], axis=1)
+        for name in ("residual_", "n")
+    )
+    area = float(np.prod([np.ptp(along) for along in rows.pixel.T])) if rows.n else 0.0
     distance = np.hypot(*residual.T)
     share = np.pi * (_NEAR * distance) ** 2 / max(area, 1e-300)
     pairs, expected = [], 0.0
-    keys = [result.exposure_index[chosen], table["detector_id"].to_numpy()[chosen]]
-    for rows in pd.Series(chosen).groupby(keys).indices.values():
-        if len(rows) < 2:
+    of_run = np.searchsorted(rows.runs, np.flatnonzero(far), side="right")
+    for near in np.split(np.arange(len(chosen)), 1 + np.flatnonzero(np.diff(of_run))):
+        if len(near) < 2:
             continue
-        a, b = _pairs(at[rows], at[rows] - residual[rows], _NEAR * distance[rows])
-        pairs += [chosen[np.stack([rows[a], rows[b]], axis=1).ravel()]]
+        a, b = _pairs(at[near], at[near] - residual[near], _NEAR * distance[near])
+        pairs += [chosen[np.stack([near[a], near[b]], axis=1).ravel()]]
         # Each is there by chance.
-        expected += 0.5 * float(np.minimum(share[rows], 1.0).sum()) ** 2
+        expected += 0.5 * float(np.minimum(share[near], 1.0).sum()) ** 2
     found = np.concatenate([np.empty(0, dtype=np.int64), *pairs])
     chance = log_chance_poisson(len(found) // 2, expected)
     sources = tuple(np.unique(table["source_id"].to_numpy()[found]).tolist())
-    return Swapped(found, sources, expected, chance, float(chi2[np.unique(found)].sum()))
+    return Swapped(found, sources, expected, chance, float(chi2[np.isin(chosen, found)].sum()))
 
 
 def _pairs(

@@ -20,11 +20,12 @@ from solver.results.diagnosis.rate import (
     log_chance,
     sigmas,
 )
+from solver.results.diagnosis.read_rows import camera_rows
 from solver.results.diagnosis.references import (
     CatalogueChi2,
     catalogue_chi2,
 )
-from solver.results.diagnosis.rows import Camera, Rows, camera_rows
+from solver.results.diagnosis.rows import Camera, Rows
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
 from solver.results.diagnosis.star_tests import epoch_tests, other_star_tests, reference_tests
 from solver.results.diagnosis.swapped import Swapped, swapped
@@ -112,9 +113,10 @@ def diagnose(result: FitResult) -> Diagnosis:
         steady = _steady(result, camera, rows)
         of_others = np.where(is_reference, np.nan, magnitude)
         scatter = scatter_tests(steady.rows, of_others, without=steady.swinging)
-        pairs = swapped(result)
+        pairs = swapped(result, rows)
         references, others = (
-            catalogue_chi2(result.sources[chosen]) for chosen in (is_reference, ~is_reference)
+            catalogue_chi2(result.sources, chosen=chosen)
+            for chosen in (is_reference, ~is_reference)
         )
         epoch = epoch_offset(result.sources)
         along, weight = products(patterns, steady.rows), float(steady.rows.weight.sum())

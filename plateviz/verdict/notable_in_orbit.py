@@ -41,7 +41,7 @@ def _far_sources(result: FitResult) -> list[str]:
     dof, chi2 = (result.sources[name].to_numpy(dtype=float) for name in ("dof", "chi2"))
     # Of the others, so many good ones are larger that none is far.
     above = np.ones(len(dof))
-    might = (dof > 0.0) & (chi2 > dof + 2.0 * np.sqrt(2.0 * dof))
+    might = (dof > 0.0) & (chi2 > dof + 2.0 * np.sqrt(2.0 * np.maximum(dof, 0.0)))
     above[might] = chdtrc(dof[might], chi2[might])
     is_far = above < _BY_CHANCE / max(np.count_nonzero(dof > 0.0), 1)
     if not is_far.any():

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise, zip_longest
+from itertools import chain, pairwise, zip_longest
 from typing import NamedTuple
 
 from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
@@ -21,8 +21,8 @@ _LEFT, _TICKS, _RIGHT, _BAR = 32, 34, 18, 72
 _TITLE, _TOOLBAR, _SPACE, _LINE, _BELOW, _LABEL, _FREE = 19, 38, 18, 15, 48, 18, 8
 # A row of the legend, the mark of one of its labels.
 _ROW, _MARK = 26, 32
-# Words that would leave a frame less than this height, in screen pixels, or less than this share of
-# its height, are left out.
+# Words that take height from a frame are left out where they would leave it less than this height,
+# in screen pixels, or less than this share of what it has without them.
 _ENOUGH, _SHARE = 100, 0.65
 # Lines of the label of an axis, at most.
 _X_LINES, _Y_LINES = 2, 3
@@ -42,8 +42,8 @@ def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figu
 
     Frames with equal scales of both axes keep them. Frames that share no x axis are arranged in
     as many columns as leave them largest. Those that are narrower than the area are in its middle.
-    Subtitles or legends are left out where they would take much of the height. An axis has no label
-    that the next frame to the left or below repeats.
+    The last lines of subtitles, or legends, are left out where they would take much of the height.
+    An axis has no label that the next frame to the left or below repeats.
 
     Parameters
     ----------
@@ -68,15 +68,26 @@ def _free(figure: Figure, columns: int, corner: int) -> Figure:
 
 def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
     """Return the figure with its words, without those that would take much of the height."""
-    figure = _with_shared_legends(figure, columns)
-    no_subtitle, no_legend = {"subtitle": ""}, {"legend_columns": 0}
-    candidates = []
-    for without in ({}, no_subtitle, no_legend, no_subtitle | no_legend):
-        frames = tuple(replace(frame, **without) for frame in figure)
-        candidates.append(_fitted(Figure(frames, columns, figure.linked), width, height))
-    *wordy, bare = candidates
-    enough = max(_ENOUGH, _SHARE * _least_height(bare))
+    whole = replace(_with_shared_legends(figure, columns), columns=columns)
+    without_legend = _without_legend(whole)
+    bare = _fitted(_with_lines_of_subtitle(without_legend, 0), width, height)
+    least = _least_height(bare)
+    enough = min(least, max(_ENOUGH, _SHARE * least))
+    lines = max(len(frame.subtitle.split("\n")) for frame in figure)
+    fewer = (_with_lines_of_subtitle(whole, count) for count in reversed(range(lines)))
+    wordy = (_fitted(one, width, height) for one in chain([whole], fewer, [without_legend]))
     return next((one for one in wordy if _least_height(one) >= enough), bare)
+
+
+def _without_legend(figure: Figure) -> Figure:
+    return replace(figure, frames=tuple(replace(frame, legend_columns=0) for frame in figure))
+
+
+def _with_lines_of_subtitle(figure: Figure, count: int) -> Figure:
+    """Return the figure with the first lines of the subtitle of each frame."""
+    subtitles = ["\n".join(frame.subtitle.split("\n")[:count]) for frame in figure]
+    frames = zip(figure, subtitles, strict=True)
+    return replace(figure, frames=tuple(replace(frame, subtitle=one) for frame, one in frames))
 
 
 def _with_shared_legends(figure: Figure, columns: int) -> Figure:

@@ -87,7 +87,7 @@ def _in_finer_unit(rows: pd.DataFrame) -> pd.DataFrame:
 def _subtitle(first: pd.Series, unit: str) -> str:
     change, scatter = (number_text(float(first[name]), 3) for name in ("change", "scatter"))
     return (
-        f"{first['label']}: change {change} {unit},\n"
+        f"{first['label']}: change {change} {unit}\n"
         f"scatter {scatter} {unit}; trend {first['sigma']:.1f} sigma"
     )
 

@@ -81,6 +81,24 @@ def test_words_are_left_out_where_they_would_take_most_of_the_height():
     assert large[0].subtitle == wordy[0].subtitle
 
 
+def test_last_lines_of_a_subtitle_give_way_first():
+    lines = [f"line {number}" for number in range(9)]
+    wordy = frame(subtitle="\n".join(lines))
+    shown = [resized(wordy, 300, height)[0].subtitle.split("\n") for height in (500, 270, 240)]
+    assert lines == shown[0]
+    assert lines[: len(shown[1])] == shown[1]
+    assert lines[: len(shown[2])] == shown[2]
+    assert len(shown[0]) > len(shown[1]) > len(shown[2]) > 0
+
+
+def test_words_are_shown_wherever_they_take_no_height():
+    row = Figure(frame(height=None, subtitle="a line").frames * 3, 3)
+    area = (480, 300)
+    (width, height), *_ = sizes(resized(row, *area))
+    assert height < 100
+    assert [one.subtitle for one in resized(row, *area)] == ["a line"] * 3
+
+
 def test_frames_of_a_row_have_one_height():
     row = side_by_side([frame(subtitle="a line"), frame(subtitle="")], columns=2)
     assert len({height for _, height in sizes(resized(row, 900, 300))}) == 1

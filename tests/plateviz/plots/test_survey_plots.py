@@ -272,7 +272,7 @@ def test_trends_are_in_units_that_suit_their_values(drawings, unit, factor, show
     (frame,) = draw(scaled)
     assert frame.y.label == f"value minus mean ({shown})"
     assert max(frame.y.limits) == pytest.approx(limit, rel=0.3)
-    assert f"{shown},\n" in frame.subtitle
+    assert f"{shown}\n" in frame.subtitle
     assert set(frame["angle of the first orbit"].columns["unit"]) == {shown}
 
 

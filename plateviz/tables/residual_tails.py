@@ -8,7 +8,7 @@ from scipy.special import erfc, ndtr, ndtri, pdtrik
 
 from plateviz.tables.labels import exposure_labels
 from solver.data.result import FitResult
-from solver.results.diagnosis.rows import FAR
+from solver.results.diagnosis.outliers import are_outliers
 
 THRESHOLDS = tuple(np.arange(1.0, 6.1, 0.5))
 """Thresholds of the standardised residual, absolute value."""
@@ -17,8 +17,6 @@ AXIS, EXPOSURE, DETECTOR = "axis", "exposure", "detector"
 _REACH = 2.0
 # Median of the absolute value of a unit normal value.
 _MEDIAN = float(ndtri(0.75))
-# Of the larger of two chi2 with one degree of freedom each.
-_MEDIAN_OF_LARGER = float(ndtri(0.5 + 0.5 * np.sqrt(0.5))) ** 2
 # Measurements of which the fit leaves less than this share do not count.
 _LEAST_LEFT = 0.02
 # Fewer measurements of an exposure have no kurtosis.
@@ -129,14 +127,14 @@ def kurtosis_by_group(result: FitResult) -> pd.DataFrame:
     `high` (range of two sigma), `sigmas` (as those of a unit normal value). Exposures and detectors
     of fewer than eight measurements have no row
     """
-    rows = result.residuals
+    order = np.argsort(result.exposure_index, kind="stable")
+    rows, exposure = result.residuals.iloc[order], result.exposure_index[order]
     left = 1.0 - np.clip(0.5 * rows["leverage"].to_numpy(), 0.0, 1.0)
     size = np.maximum(left, _LEAST_LEFT)
     squares = np.stack(
         [np.square(rows[f"residual_{axis}"] / rows[f"s{axis}"]).to_numpy() / size for axis in "xy"]
     )
-    exposure = result.exposure_index
-    used = (left > _LEAST_LEFT) & ~_are_far(squares.max(axis=0), exposure)
+    used = (left > _LEAST_LEFT) & ~are_outliers(squares.max(axis=0), exposure)
     squares, exposure = squares[:, used], exposure[used]
     detector, detectors = pd.factorize(rows["detector_id"].to_numpy()[used], sort=True)
     terms = _polynomial(squares.mean(axis=0), exposure)
@@ -148,23 +146,6 @@ def kurtosis_by_group(result: FitResult) -> pd.DataFrame:
         _groups(DETECTOR, detector, terms, detectors.astype(str)),
     ]
     return pd.concat(found, ignore_index=True).fillna({"exposure": ""})
-
-
-def _are_far(largest: np.ndarray, exposure: np.ndarray) -> np.ndarray:
-    """Return which measurements are outliers, as the tests of the solution find them.
-
-    Parameters
-    ----------
-    largest : square of the residual over its expected scatter, of the axis where it is larger
-    exposure : of each measurement
-    """
-    is_far = largest > FAR**2
-    for one in np.unique(exposure[is_far]):
-        chosen = exposure == one
-        # An exposure that scatters by more has fewer of them, never more.
-        scale = max(float(np.median(largest[chosen])) / _MEDIAN_OF_LARGER, 1.0)
-        is_far[chosen] = largest[chosen] > FAR**2 * scale
-    return is_far
 
 
 def _polynomial(half: np.ndarray, exposure: np.ndarray) -> np.ndarray:

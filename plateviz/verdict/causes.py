@@ -33,7 +33,7 @@ class Cause(NamedTuple):
     name : short and unique, for programs
     title : the cause as a clause, without a full stop
     words : the evidence, in sentences
-    significance : in sigmas
+    significance : in sigmas; zero where no test shows it
     spoils : which numbers it spoils, and by how much
     action : what to do
     options : options of `plateviz fit` that do it; empty if there are none
@@ -60,11 +60,16 @@ class Cause(NamedTuple):
             return f"Or, nearly as likely: {self.title}"
         return self.title[0].upper() + self.title[1:]
 
+    def strength(self) -> str:
+        """Return the significance as the end of a sentence without its full stop, or nothing."""
+        sigmas = f"{self.significance:.0f}"
+        return "" if sigmas == "0" else f", {sigmas} sigma"
+
     def sentence(self) -> str:
         """Return all of it as text."""
         options = f" ({' '.join(self.options)})" if self.options else ""
         return (
-            f"{self.heading()}, {self.significance:.0f} sigma. {self.words} {self.spoils} "
+            f"{self.heading()}{self.strength()}. {self.words} {self.spoils} "
             f"What to do: {self.action}{options}."
         )
 

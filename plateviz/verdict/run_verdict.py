@@ -55,7 +55,7 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     else:
         reasons += [*_tested(diagnosis, found, tables), *_fitted(orbits), *_motions(motions)]
         reasons += _smooth_errors(tables.zonal, found, causes)
-    faults = [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
+    faults = [f"{cause.heading()}{cause.strength()}." for cause in causes]
     faults += [f"{words[0].upper()}{words[1:]}." for words in without]
     notable = [*_failed(orbits), *_notable(diagnosis, far)]
     tests = _in_words(diagnosis, found)

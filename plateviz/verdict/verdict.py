@@ -137,7 +137,7 @@ def _judge(result: FitResult) -> Verdict:
     ]
     faults = [
         *([] if converged else [_converged(result)]),
-        *(f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes),
+        *(f"{cause.heading()}{cause.strength()}." for cause in causes),
         *in_doubt,
         *([discoveries] if alarms and not causes else []),
     ]

@@ -6,12 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.data.result import FitResult
-from solver.results.diagnosis.rows import FAR, Camera, Rows, detector_spans, turned
+from solver.results.diagnosis.outliers import are_outliers
+from solver.results.diagnosis.rows import Camera, Rows, detector_spans, turned
 from solver.results.diagnosis.sorted_table import SortedTable, places_of_sources, sorted_table
 from solver.units import MINUTES_PER_DAY, RAD_PER_MAS
 
-# Median of the larger of two chi2 with one degree of freedom each.
-_MEDIAN_OF_LARGER = 1.1063
 # Residuals of which the fit leaves less than this share are rounding errors.
 _LEAST_LEFT = 1e-6
 
@@ -110,7 +109,8 @@ def _sizes(
     # Each axis is contiguous: sums of the two are twice as fast as along the second one.
     squares = residual / sigma
     square_x, square_y = np.square(squares, out=squares).T
-    is_far = _far(np.maximum(square_x, square_y), left, table)
+    largest = np.maximum(square_x, square_y) / np.maximum(left, _LEAST_LEFT)
+    is_far = are_outliers(largest, table.exposure) & (left > _LEAST_LEFT)
     um = table.of_detectors(pitch.T).T
     residual *= um
     residual[is_far] = 0.0
@@ -123,23 +123,6 @@ def _sizes(
         chi2=square_x + square_y,
         is_far=is_far,
     )
-
-
-def _far(squares: np.ndarray, left: np.ndarray, table: SortedTable) -> np.ndarray:
-    """Return which measurements are far off, by the scatter of their exposure, which is robust.
-
-    Parameters
-    ----------
-    squares : of the residual over its uncertainty, of the axis where it is larger
-    """
-    squares = squares / np.maximum(left, _LEAST_LEFT)
-    is_far = squares > FAR**2
-    # An exposure that scatters by more has fewer of them, never more.
-    for exposure in np.unique(table.exposure[is_far]):
-        rows = slice(*np.searchsorted(table.exposure, [exposure, exposure + 1]))
-        scale = max(float(np.median(squares[rows])) / _MEDIAN_OF_LARGER, 1.0)
-        is_far[rows] = squares[rows] > FAR**2 * scale
-    return is_far & (left > _LEAST_LEFT)
 
 
 def _camera(result: FitResult, turn: np.ndarray, pitch: np.ndarray, place: _Places) -> Camera:

@@ -8,8 +8,6 @@ from solver.data.detector_spans import Move, span_numbers, with_moves
 from solver.data.result import FitResult
 from solver.results.diagnosis.sorted_table import over_runs, runs_of
 
-# Sigmas beyond which a residual is an outlier: one good one in five hundred million is.
-FAR = 6.0
 # Of exposures whose functions are computed together: less would be many small steps.
 _ROWS_OF_BLOCK = 16_384
 

@@ -7,7 +7,7 @@ import numpy as np
 from solver.results.diagnosis.rate import log_chance, log_chance_normal, log_chance_poisson
 from solver.results.diagnosis.rows import Rows
 
-# Chance of a good residual beyond `rows.FAR` on either axis.
+# Chance of a good residual beyond `outliers.FAR` on either axis.
 _FAR_BY_CHANCE = 4.0e-9
 # Degrees of freedom below which a chi2 says nothing.
 FEWEST = 2.0
@@ -62,9 +62,9 @@ def scatter_tests(
         one /= typical
     found = [
         Scatter("noise", scale, 1.0, spread, log_chance_normal(whole), freedom),
-        _dispersion("exposures", *(_summed(rows.exposure[rows.runs], one) for one in of_runs)),
+        _dispersion("exposures", *(np.bincount(rows.exposure[rows.runs], one) for one in of_runs)),
         _dispersion("sources", *of_sources),
-        _dispersion("detectors", *(_summed(rows.detector[rows.runs], one) for one in of_runs)),
+        _dispersion("detectors", *(np.bincount(rows.detector[rows.runs], one) for one in of_runs)),
     ]
     slope = _slope(magnitude, *of_sources)
     count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
@@ -78,11 +78,6 @@ def _normalised(chi2: np.ndarray, dof: np.ndarray) -> np.ndarray:
     """Return chi2 values as unit normal ones (Wilson and Hilferty)."""
     spread = 2.0 / (9.0 * dof)
     return (np.cbrt(np.maximum(chi2, 0.0) / dof) - (1.0 - spread)) / np.sqrt(spread)
-
-
-def _summed(group: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the sums of values over groups."""
-    return np.bincount(group, values)
 
 
 def _dispersion(name: str, chi2: np.ndarray, dof: np.ndarray) -> Scatter:

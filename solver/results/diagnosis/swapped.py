@@ -6,8 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solver.data.result import FitResult
+from solver.results.diagnosis.outliers import FAR
 from solver.results.diagnosis.rate import log_chance_poisson
-from solver.results.diagnosis.rows import FAR, Rows
+from solver.results.diagnosis.rows import Rows
 
 # Of its own residual: how near one has to be to where the other should be. The positions of
 # both stars are off, too, by the share that one wrong measurement has in them.

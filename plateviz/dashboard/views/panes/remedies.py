@@ -112,7 +112,7 @@ def _words(cause: Cause) -> str:
     # All of it is in the verdict above.
     evidence = f"{cause.words.partition('. ')[0].rstrip('.')}."
     return (
-        f"<p class='cause'><b>{escape(cause.heading())}</b>, {cause.significance:.0f} sigma. "
+        f"<p class='cause'><b>{escape(cause.heading())}</b>{cause.strength()}. "
         f"{escape(action)}.{options}{_and_more(cause)}<br>"
         f"<span>{escape(evidence)} {escape(cause.spoils)}</span></p>"
     )

@@ -197,13 +197,13 @@ def _quantities(result: FitResult, instrument: Instrument, source: np.ndarray) -
         yield _Binned("magnitude", "mag", known[source], cells[source])
     for axis in "xy":
         at = rows[f"n{axis}"].to_numpy()
+        half = 0.5 * max(getattr(detector, f"n_{axis}") for detector in instrument.detectors)
+        yield _Binned(f"place along {axis}", "pixel", at, _equal_widths(at, -half, half))
+    for axis in "xy":
+        at = rows[f"n{axis}"].to_numpy()
         phase = at - np.floor(at)
         cells = _equal_widths(phase, 0.0, 1.0)
         yield _Binned(f"pixel phase in {axis}", "pixel", phase, cells)
-    for axis in "xy":
-        at = rows[f"n{axis}"].to_numpy()
-        half = 0.5 * max(getattr(detector, f"n_{axis}") for detector in instrument.detectors)
-        yield _Binned(f"place along {axis}", "pixel", at, _equal_widths(at, -half, half))
 
 
 def _equal_widths(values: np.ndarray, low: float, high: float) -> np.ndarray:

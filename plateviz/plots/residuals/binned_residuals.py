@@ -18,6 +18,8 @@ _SERIES = (
     ("scatter", "pull_chi2", "square"),
 )
 _MOST_COLUMNS, _MARGIN = 3, 0.05
+# A low frame has no other labels than those at zero and ± 5.
+_LEAST_REACH = 5.2
 _HOVER = [
     ("@{quantity}", "@{centre}{0.00} @{unit}"),
     ("mean x", "@{mean_x_mpix}{0.00} ± @{sigma_x_mpix}{0.00} mpix"),
@@ -40,7 +42,7 @@ def plot_binned_residuals(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> F
         text = "No bins with enough measurements"
         return message(_TITLE, text, width=FRAME_WIDTH, xlabel="time (min)", ylabel=_YLABEL)
     statistics = bin_statistics(table)
-    reach = 1.12 * max(statistics.largest, statistics.limit)
+    reach = max(_LEAST_REACH, 1.12 * max(statistics.largest, statistics.limit))
     quantities = [rows for _, rows in table.groupby("quantity", sort=False)]
     panels = [
         _panel(rows, statistics.limit, reach, width, is_first=rows is quantities[0])
@@ -76,7 +78,7 @@ def _panel(rows: pd.DataFrame, limit: float, reach: float, width: int, *, is_fir
     found = bin_statistics(rows)
     return framed(
         glyphs,
-        title=f"Residuals against {name}" if is_first else f"Against {name}",
+        title=f"Residuals against {name}" if is_first else f"{name[0].upper()}{name[1:]}",
         subtitle=(
             f"{found.beyond} of {found.values} beyond ± 2σ, {found.expected:.1f} expected; "
             f"largest {found.largest:.1f}σ, {found.of_largest}"

@@ -115,7 +115,7 @@ def test_detectors_are_whole_however_large_the_bins_are(fit_result, instrument):
 def test_each_quantity_has_a_panel_with_means_and_scatter(binned):
     frames = plots.plot_binned_residuals(binned)
     for frame, (name, rows) in zip(frames, binned.groupby("quantity", sort=False), strict=True):
-        assert frame.title.lower().endswith(f"against {name}")
+        assert frame.title.lower().endswith(name)
         assert frame.x.label == f"{name} ({rows['unit'].iloc[0]})"
         for series, pull in (("mean x", "pull_x"), ("mean y", "pull_y"), ("scatter", "pull_chi2")):
             assert np.array_equal(frame[series].values("x"), rows["centre"])

@@ -187,10 +187,10 @@ def test_without_magnitudes_there_are_no_bins_of_magnitude(known, instrument):
     unknown = replace(known, sources=known.sources.assign(magnitude=np.nan))
     assert list(tables.binned_residuals(unknown, instrument)["quantity"].unique()) == [
         "time",
-        "pixel phase in x",
-        "pixel phase in y",
         "place along x",
         "place along y",
+        "pixel phase in x",
+        "pixel phase in y",
     ]
 
 

@@ -20,6 +20,7 @@ from solver.io.fits import FitsFile, read_fits, read_primary_header
 from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
 from solver.io.outputs import FITS_SUFFIXES, check_output
 from solver.io.published_layout import PublishedTable, WrittenColumn
+from solver.io.result_ids import check_ids
 from solver.io.settings import parse_settings
 
 _SUMMARY = "SUMMARY"
@@ -130,6 +131,7 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
         },
     )
     _check_count(path, file)
+    check_ids(path, result)
     return result
 
 

@@ -338,6 +338,22 @@ def test_column_of_another_type_is_refused(written):
 
 
 @pytest.mark.parametrize(
+    ("column", "message"),
+    [
+        ("source_id", "column source_id: expected ids of HDU RESULT, found 1 others: 77"),
+        ("plate_id", r"columns field_id and plate_id: .* HDU EXPOSURES, found 1 others: \(0, 77\)"),
+        ("detector_id", "column detector_id: expected ids of the instrument .* 1 others: 77"),
+    ],
+)
+def test_residual_of_what_the_result_does_not_have_is_refused(written, column, message):
+    def change(hdus):
+        hdus["SAMPLE"].data[column][5] = 77
+
+    with pytest.raises(InputError, match=f"HDU SAMPLE, {message}"):
+        read_result(_edited(written, change))
+
+
+@pytest.mark.parametrize(
     ("key", "value", "message"),
     [("order", "77", "from 0 to 9, found 77"), ("order", "nonsense", "HDU SUMMARY: expected")],
 )

@@ -8,6 +8,12 @@ from typing import NamedTuple
 
 from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
 from plateviz.figures.fitting_texts import with_fitting_texts
+from plateviz.figures.legends import (
+    legend_columns_that_fit,
+    legend_rows,
+    with_shared_legends,
+    without_legend,
+)
 from plateviz.figures.text_width import has_room_for_words, text_width, wrapped
 from plateviz.figures.theme import LABEL_SIZE, SMALL_SIZE, TITLE_SIZE
 from plateviz.figures.tick_count import longest_label
@@ -19,8 +25,8 @@ _LEFT, _TICKS, _RIGHT, _BAR = 32, 34, 18, 72
 # A line of the title, the toolbar beside the subtitle, space around its lines, one of these lines,
 # the lower axis with its labels, the label of that axis, space below it.
 _TITLE, _TOOLBAR, _SPACE, _LINE, _BELOW, _LABEL, _FREE = 19, 38, 18, 15, 48, 18, 8
-# A row of the legend, the mark of one of its labels.
-_ROW, _MARK = 26, 32
+# A row of the legend.
+_ROW = 26
 # Words that take height from a frame are left out where they would leave it less than this height,
 # in screen pixels, or less than this share of what it has without them.
 _ENOUGH, _SHARE = 100, 0.65
@@ -53,10 +59,24 @@ def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figu
     columns = [figure.columns]
     if figure.linked != "x":
         columns += range(1, len(figure) + 1)
-    candidates = [
-        _arranged(_free(figure, n, corner), n, width, height) for n in dict.fromkeys(columns)
+    arrangements = [
+        _bare(_free(figure, n, corner), n, width, height) for n in dict.fromkeys(columns)
     ]
-    return max(candidates, key=_quality)
+    best, quality = arrangements[0].bare, -math.inf
+    # Words only take room: frames that are smaller without any cannot become the largest with them.
+    for one in sorted(arrangements, key=lambda one: -_size(one.bare)):
+        if _size(one.bare) > quality:
+            wordy = _with_words(one, width, height)
+            if _quality(wordy) > quality:
+                best, quality = wordy, _quality(wordy)
+    return best
+
+
+class _Arrangement(NamedTuple):
+    """Frames in a number of columns: with all words, not yet fitted, and without any, fitted."""
+
+    whole: Figure
+    bare: Figure
 
 
 def _free(figure: Figure, columns: int, corner: int) -> Figure:
@@ -66,21 +86,21 @@ def _free(figure: Figure, columns: int, corner: int) -> Figure:
     return replace(figure, frames=tuple(frames))
 
 
-def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
+def _bare(figure: Figure, columns: int, width: int, height: int) -> _Arrangement:
+    whole = replace(with_shared_legends(figure, columns), columns=columns)
+    bare = _with_lines_of_subtitle(without_legend(whole), 0)
+    return _Arrangement(whole, _fitted(bare, width, height))
+
+
+def _with_words(arrangement: _Arrangement, width: int, height: int) -> Figure:
     """Return the figure with its words, without those that would take much of the height."""
-    whole = replace(_with_shared_legends(figure, columns), columns=columns)
-    without_legend = _without_legend(whole)
-    bare = _fitted(_with_lines_of_subtitle(without_legend, 0), width, height)
+    whole, bare = arrangement
     least = _least_height(bare)
     enough = min(least, max(_ENOUGH, _SHARE * least))
-    lines = max(len(frame.subtitle.split("\n")) for frame in figure)
+    lines = max(len(frame.subtitle.split("\n")) for frame in whole)
     fewer = (_with_lines_of_subtitle(whole, count) for count in reversed(range(lines)))
-    wordy = (_fitted(one, width, height) for one in chain([whole], fewer, [without_legend]))
+    wordy = (_fitted(one, width, height) for one in chain([whole], fewer, [without_legend(whole)]))
     return next((one for one in wordy if _least_height(one) >= enough), bare)
-
-
-def _without_legend(figure: Figure) -> Figure:
-    return replace(figure, frames=tuple(replace(frame, legend_columns=0) for frame in figure))
 
 
 def _with_lines_of_subtitle(figure: Figure, count: int) -> Figure:
@@ -88,24 +108,6 @@ def _with_lines_of_subtitle(figure: Figure, count: int) -> Figure:
     subtitles = ["\n".join(frame.subtitle.split("\n")[:count]) for frame in figure]
     frames = zip(figure, subtitles, strict=True)
     return replace(figure, frames=tuple(replace(frame, subtitle=one) for frame, one in frames))
-
-
-def _with_shared_legends(figure: Figure, columns: int) -> Figure:
-    """Return the figure with one legend for all frames that have the same labels.
-
-    It is below the first of them in the last row that has any: a legend below each would say the
-    same.
-    """
-    alike: dict[frozenset[str], list[int]] = {}
-    for n, frame in enumerate(figure):
-        if frame.legend_columns:
-            alike.setdefault(frozenset(_labels(frame)), []).append(n)
-    keepers = {}
-    for numbers in alike.values():
-        keeper = next(n for n in numbers if n // columns == numbers[-1] // columns)
-        keepers[keeper] = max(figure[n].legend_columns for n in numbers)
-    frames = [replace(frame, legend_columns=keepers.get(n, 0)) for n, frame in enumerate(figure)]
-    return replace(figure, frames=tuple(frames))
 
 
 def _fitted(figure: Figure, width: int, height: int) -> Figure:
@@ -182,7 +184,7 @@ def _above(row: list[Frame]) -> int:
 def _below(row: list[Frame]) -> int:
     lines = max(frame.x.label.count("\n") if frame.x.label else -1 for frame in row)
     label = _LINE * lines if lines >= 0 else -_LABEL
-    return _BELOW + label + max(_rise(f.x) + _ROW * _legend_rows(f) for f in row)
+    return _BELOW + label + max(_rise(f.x) + _ROW * legend_rows(f) for f in row)
 
 
 def _of_height(frame: Frame, height: int, column: _Column) -> Frame:
@@ -206,7 +208,7 @@ def _of_width(frame: Frame, width: int, column: _Column) -> Frame:
         beside=column.left,
         indent=indent,
     )
-    return replace(placed, legend_columns=_legend_columns(placed))
+    return replace(placed, legend_columns=legend_columns_that_fit(placed))
 
 
 def _with_lines(axis: Axis, room: int, most: int) -> Axis:
@@ -225,16 +227,20 @@ def _y_room(row: list[Frame]) -> int:
     return row[0].frame_height + 2 * (min(above, _below(row)) - _FREE)
 
 
-def _quality(figure: Figure) -> float:
-    """Return the shortest side of a frame, less where a place is empty or a word is broken."""
+def _size(figure: Figure) -> float:
+    """Return the shortest side of a frame, less where a place is empty."""
     least = min(min(frame.width, 2 * frame.frame_height) for frame in figure)
+    places = figure.columns * math.ceil(len(figure) / figure.columns)
+    return least * len(figure) / places
+
+
+def _quality(figure: Figure) -> float:
+    """Return the size of the frames, half of it where a word is broken."""
     is_whole = all(
         has_room_for_words(frame.title, frame.words_width, TITLE_SIZE, is_bold=True)
         for frame in figure
     )
-    places = figure.columns * math.ceil(len(figure) / figure.columns)
-    filled = least * len(figure) / places
-    return filled if is_whole else filled / 2.0
+    return _size(figure) if is_whole else _size(figure) / 2.0
 
 
 def _least_height(figure: Figure) -> float:
@@ -264,25 +270,3 @@ def _longest_tick(axis: Axis) -> float:
     if axis.ticks is None:
         return text_width(longest_label(axis), SMALL_SIZE)
     return max((text_width(label, SMALL_SIZE) for _, label in axis.ticks), default=0.0)
-
-
-def _legend_columns(frame: Frame) -> int:
-    labels = _labels(frame)
-    if not frame.legend_columns or not labels:
-        return frame.legend_columns
-    # A label that is wider than this would be cut off.
-    return min(len(labels), int(frame.words_width / _legend_entry(frame)))
-
-
-def _legend_entry(frame: Frame) -> float:
-    """Return the width of a column of the legend, screen pixels."""
-    widths = (text_width(label, SMALL_SIZE) for label in _labels(frame))
-    return _MARK + max(widths, default=0.0)
-
-
-def _legend_rows(frame: Frame) -> int:
-    return math.ceil(len(_labels(frame)) / frame.legend_columns) if frame.legend_columns else 0
-
-
-def _labels(frame: Frame) -> set[str]:
-    return set().union(*(glyphs.labels for glyphs in frame.glyphs))

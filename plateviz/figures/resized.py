@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain, pairwise, zip_longest
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
@@ -98,8 +98,11 @@ def _with_words(arrangement: _Arrangement, width: int, height: int) -> Figure:
     least = _least_height(bare)
     enough = min(least, max(_ENOUGH, _SHARE * least))
     lines = max(len(frame.subtitle.split("\n")) for frame in whole)
-    fewer = (_with_lines_of_subtitle(whole, count) for count in reversed(range(lines)))
-    wordy = (_fitted(one, width, height) for one in chain([whole], fewer, [without_legend(whole)]))
+    wordy = (
+        _fitted(_with_lines_of_subtitle(one, count), width, height)
+        for one in (whole, without_legend(whole))
+        for count in reversed(range(lines + 1))
+    )
     return next((one for one in wordy if _least_height(one) >= enough), bare)
 
 
@@ -120,9 +123,13 @@ def _fitted(figure: Figure, width: int, height: int) -> Figure:
         [replace(one, y=_with_lines(one.y, _y_room(row), _Y_LINES)) for one in frames]
         for frames, row in zip(labelled, fitted, strict=True)
     ]
-    if any("\n" in frame.y.label for row in wrapped_rows for frame in row):
+    if _y_labels(wrapped_rows) != _y_labels(labelled):
         fitted = _fitted_rows(wrapped_rows, width, height)
     return replace(figure, frames=tuple(with_fitting_texts(one) for row in fitted for one in row))
+
+
+def _y_labels(rows: Rows) -> list[str]:
+    return [frame.y.label for row in rows for frame in row]
 
 
 def _with_outer_labels(rows: Rows) -> Rows:

@@ -11,7 +11,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.binned_residuals import bin_statistics, binned_residuals
 
 _TITLE = "Residuals against time, magnitude and place"
-_YLABEL = "(found minus expected) / σ"
+_YLABEL = "found minus expected (σ)"
 _SERIES = (
     ("mean x", "pull_x", "circle"),
     ("mean y", "pull_y", "triangle"),
@@ -80,8 +80,8 @@ def _panel(rows: pd.DataFrame, limit: float, reach: float, width: int, *, is_fir
         glyphs,
         title=f"Residuals against {name}" if is_first else f"{name[0].upper()}{name[1:]}",
         subtitle=(
-            f"{found.beyond} of {found.values} beyond ± 2σ, {found.expected:.1f} expected; "
-            f"largest {found.largest:.1f}σ, {found.of_largest}"
+            f"largest {found.largest:.1f}σ, {found.of_largest}\n"
+            f"{found.beyond} of {found.values} beyond ± 2σ, {found.expected:.1f} expected"
         ),
         x=Axis(f"{name} ({unit})", (low - margin, high + margin)),
         y=Axis(_YLABEL, (-reach, reach)),

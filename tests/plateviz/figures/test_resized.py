@@ -206,6 +206,16 @@ def test_a_long_label_takes_lines_beside_and_below_its_frame():
     assert max(text_width(line, 12) for line in lines) < 290
 
 
+def test_a_label_for_which_a_low_frame_has_no_room_is_left_out():
+    y = Axis("a label of many words that are all of them much too long for it", (0.0, 1.0))
+    (low,), (high,) = (
+        resized(framed([], title="Marks", x=X, y=y, width=200, height=100), 500, height)
+        for height in (150, 700)
+    )
+    assert (low.y.label, high.y.label) == ("", y.label)
+    assert low.beside < high.beside
+
+
 def test_titles_of_a_row_begin_on_one_line():
     first, last = (
         replace(frame()[0], title=text, width=110) for text in ("Marks", "Non-reference")

@@ -49,6 +49,6 @@ def _check(
         more = len(missing) - _MOST_LISTED
         raise InputError(
             f"{path}, HDU {layout.SAMPLE.hdu}, {plural(len(names), 'column')} "
-            f"{' and '.join(names)}: expected ids of {where}, found {len(missing):,} others: "
-            f"{listed}{f' and {more:,} more' if more > 0 else ''}"
+            f"{' and '.join(names)}: expected ids of {where}, found {len(missing):,} that it "
+            f"does not have: {listed}{f' and {more:,} more' if more > 0 else ''}"
         )

@@ -60,10 +60,10 @@ def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figu
     if figure.linked != "x":
         columns += range(1, len(figure) + 1)
     arrangements = [
-        _bare(_free(figure, n, corner), n, width, height) for n in dict.fromkeys(columns)
+        _arranged(_free(figure, n, corner), n, width, height) for n in dict.fromkeys(columns)
     ]
     best, quality = arrangements[0].bare, -math.inf
-    # Words only take room: frames that are smaller without any cannot become the largest with them.
+    # Words take room: frames that are smaller without any hardly become the largest with them.
     for one in sorted(arrangements, key=lambda one: -_size(one.bare)):
         if _size(one.bare) > quality:
             wordy = _with_words(one, width, height)
@@ -86,7 +86,7 @@ def _free(figure: Figure, columns: int, corner: int) -> Figure:
     return replace(figure, frames=tuple(frames))
 
 
-def _bare(figure: Figure, columns: int, width: int, height: int) -> _Arrangement:
+def _arranged(figure: Figure, columns: int, width: int, height: int) -> _Arrangement:
     whole = replace(with_shared_legends(figure, columns), columns=columns)
     bare = _with_lines_of_subtitle(without_legend(whole), 0)
     return _Arrangement(whole, _fitted(bare, width, height))
@@ -97,18 +97,24 @@ def _with_words(arrangement: _Arrangement, width: int, height: int) -> Figure:
     whole, bare = arrangement
     least = _least_height(bare)
     enough = min(least, max(_ENOUGH, _SHARE * least))
-    lines = max(len(frame.subtitle.split("\n")) for frame in whole)
+    lines = max(len(frame.subtitle.splitlines()) for frame in whole)
+    has_legend = any(frame.legend_columns for frame in whole)
+    candidates = [
+        (one, count)
+        for one in ([whole, without_legend(whole)] if has_legend else [whole])
+        for count in reversed(range(lines + 1))
+    ]
+    # The last one has no words at all.
     wordy = (
         _fitted(_with_lines_of_subtitle(one, count), width, height)
-        for one in (whole, without_legend(whole))
-        for count in reversed(range(lines + 1))
+        for one, count in candidates[:-1]
     )
     return next((one for one in wordy if _least_height(one) >= enough), bare)
 
 
 def _with_lines_of_subtitle(figure: Figure, count: int) -> Figure:
     """Return the figure with the first lines of the subtitle of each frame."""
-    subtitles = ["\n".join(frame.subtitle.split("\n")[:count]) for frame in figure]
+    subtitles = ["\n".join(frame.subtitle.splitlines()[:count]) for frame in figure]
     frames = zip(figure, subtitles, strict=True)
     return replace(figure, frames=tuple(replace(frame, subtitle=one) for frame, one in frames))
 

@@ -128,7 +128,8 @@ def kurtosis_by_group(result: FitResult) -> pd.DataFrame:
     of fewer than eight measurements have no row
     """
     order = np.argsort(result.exposure_index, kind="stable")
-    rows, exposure = result.residuals.iloc[order], result.exposure_index[order]
+    columns = ["detector_id", "leverage", "residual_x", "residual_y", "sx", "sy"]
+    rows, exposure = result.residuals[columns].iloc[order], result.exposure_index[order]
     left = 1.0 - np.clip(0.5 * rows["leverage"].to_numpy(), 0.0, 1.0)
     size = np.maximum(left, _LEAST_LEFT)
     squares = np.stack(

@@ -26,9 +26,14 @@ def check_ids(path: Path, result: FitResult) -> None:
     Raises
     ------
     InputError
-        If a residual is of another one.
+        If a residual is of another one, or there is no residual.
     """
     found = result.residuals
+    if found.empty:
+        raise InputError(
+            f"{path}, HDU {layout.SAMPLE.hdu}: expected a residual of each measurement, "
+            "found no row"
+        )
     _check(path, found, result.sources, ["source_id"], f"HDU {layout.RESULT.hdu}")
     exposure = ["field_id", "plate_id"]
     _check(path, found, result.exposures, exposure, f"HDU {layout.EXPOSURES.hdu}")

@@ -353,6 +353,14 @@ def test_residual_of_what_the_result_does_not_have_is_refused(written, column, m
         read_result(_edited(written, change))
 
 
+def test_result_without_residuals_is_refused(written):
+    def change(hdus):
+        hdus["SAMPLE"].data = hdus["SAMPLE"].data[:0]
+
+    with pytest.raises(InputError, match="HDU SAMPLE: expected a residual .* found no row"):
+        read_result(_edited(written, change))
+
+
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [("order", "77", "from 0 to 9, found 77"), ("order", "nonsense", "HDU SUMMARY: expected")],
